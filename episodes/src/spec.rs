@@ -78,8 +78,8 @@ pub struct EpisodeSpec {
     /// Seed drawn by an evaluator's key, if there is a key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
-    /// By whom the robots are commanded. Where each has its own operator, each has a clock of its own, which
-    /// the host keeps.
+    /// Kind of command over the robots: by one policy, or by one operator for each robot. Operators have
+    /// clocks of their own, which the host keeps.
     #[serde(default, skip_serializing_if = "Operators::is_one")]
     pub operators: Operators,
 }

@@ -186,7 +186,7 @@ mod tests {
         // clamped.
         let later = mean(&|noise| noise.at(3.0) * noise.at(3.0 + ARM.time_s)) / variance;
         assert!((0.25..0.5).contains(&later), "{later}");
-        // A joint's target moves much less in a control step than the noise is large.
+        // In a control step a joint's target moves by much less than the amplitude of the noise.
         let step = mean(&|noise| (noise.at(3.02) - noise.at(3.0)).powi(2)).sqrt();
         assert!(step < 0.25 * ARM.deviation, "{step}");
         let again = SlowNoise::new(ARM, 1.0, &mut SplitMix64(17));

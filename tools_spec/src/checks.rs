@@ -1,5 +1,5 @@
-//! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what
-//! would work.
+//! Checks that need no world. Each returns a sentence for the caller: what is wrong, where, and what would
+//! work.
 
 use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
@@ -67,7 +67,7 @@ pub fn robots(names: &[&str]) -> Result<(), String> {
     }
 }
 
-/// With this stride a region of a whole picture fits.
+/// A region of the whole image fits with this stride.
 const WIDEST_STRIDE: u32 = 20;
 
 /// Checks that there is at least one pixel, and not too many. The episode checks that they are in the image.

@@ -1,4 +1,4 @@
-//! Errors of a call that are found before any world is asked.
+//! Errors of a call that are found without a world.
 
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ pub enum SpecError {
     /// The name is not one of the tools that act on an episode.
     #[error("no tool {name:?}; have: {}", .have.join(", "))]
     UnknownTool {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         /// Every name that would have worked.
         have: Vec<&'static str>,
@@ -39,7 +39,8 @@ pub enum SpecError {
 }
 
 impl SpecError {
-    /// Returns the error for a caller that names the episode among the arguments, as the example then does.
+    /// Returns the error for a caller that names the episode among the arguments. Its example then does so,
+    /// too.
     pub fn naming_episode(mut self, id: &str) -> SpecError {
         if let SpecError::Malformed { example, .. } = &mut self
             && let Ok(Value::Object(arguments)) = serde_json::from_str(example)

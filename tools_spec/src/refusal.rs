@@ -49,7 +49,7 @@ impl Refusal {
     /// A fault of the server.
     pub const INTERNAL: Refusal = Refusal::new("internal", "Internal error", RefusalClass::Internal);
 
-    /// Returns a refusal that stands, and whose error's text says what would work.
+    /// Returns a permanent refusal, whose error's text says what would work.
     pub const fn new(kind: &'static str, title: &'static str, class: RefusalClass) -> Refusal {
         Refusal { kind, title, class, retry_after_s: None, hint: None }
     }

@@ -23,8 +23,8 @@ impl Route {
     }
 }
 
-/// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart
-/// from it, for policies with full assistance.
+/// The arguments of one tool. The type's doc comment is the tool's description; hints on grasping are
+/// separate from it, for policies with full assistance.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Type of its reply.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
@@ -74,7 +74,7 @@ pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
     Ok(parsed)
 }
 
-/// Reads what refusals call `name`, and of which `example` is one.
+/// Parses a value that refusals call `name`; `example` is a valid one.
 pub fn read_as<T: DeserializeOwned>(
     name: &'static str,
     value: Value,
@@ -91,7 +91,7 @@ pub fn read_as<T: DeserializeOwned>(
     })
 }
 
-/// Fields that may be null may be left out, and not every face of the contract has null.
+/// Nullable fields are optional, and not every form of the contract has null.
 fn without_nulls(value: Value) -> Value {
     match value {
         Value::Array(items) => items.into_iter().map(without_nulls).collect(),

@@ -1,5 +1,4 @@
-//! A task to start from, for a scene that someone already has: its movable bodies, a place for two robots, and
-//! a first phase.
+//! Draft of a task in an existing scene: its movable bodies, a place for two robots, and a first phase.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -13,7 +12,7 @@ use tandem_sim::{
 
 /// Length of a trial. It is longer than any fall from a table.
 const TRIAL_STEPS: u32 = 100;
-/// Length of a trial of a robot's place: bodies that begin within each other part at once.
+/// Length of a trial of a robot's place: overlapping bodies separate at once.
 const PLACE_STEPS: u32 = 15;
 /// Distance within which something counts as staying in place.
 const STAYS_M: f32 = 0.03;
@@ -48,7 +47,7 @@ pub enum TaskDraftError {
     NothingMoves { scene: String, have: String },
 }
 
-/// A body of the scene as the draft tells it.
+/// A body of the scene as the draft describes it.
 struct Listed {
     name: String,
     kind: String,

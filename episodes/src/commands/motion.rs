@@ -19,9 +19,10 @@ use crate::convert::isometry_from_sim;
 
 /// Fraction of the remaining error removed in one control step: smooth, with a lag of two steps.
 const GAIN: f64 = 0.5;
-/// Control steps in which wrists get as close to their targets as they can.
+/// Number of control steps after which wrists are as close to their targets as they can get.
 const GOING_STEPS: u32 = 75;
-/// Limits of yielding. Hands creep back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S` else.
+/// Limits of yielding. Hands creep back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S`
+/// otherwise.
 const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
@@ -87,7 +88,7 @@ pub struct MotionState {
 /// Restrictions on arms that move to their aims.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Restraint {
-    /// True to keep the waist's joints.
+    /// True to hold the waist's joint angles.
     pub keeps_waist: bool,
     /// True to stop before the robot has to step.
     pub stands_fast: bool,
@@ -437,7 +438,7 @@ impl Motion {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }
 
-    /// Returns the tolerance within which a wrist has arrived at its target.
+    /// Returns the tolerance within which a wrist has reached its target.
     pub fn tolerance(&self, side: Side) -> Tolerance {
         self.body.tolerance(side)
     }

@@ -10,9 +10,9 @@ use super::moving::moving;
 use super::relative::{places, seen_from};
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task, told_name};
 
-/// Solids that end this near the top of an object belong to its top.
+/// Solids that end within this distance of an object's top belong to the top.
 const NECKS_TOP_M: f32 = 0.01;
-/// Greatest difference between the two widths of what is round.
+/// Maximum difference between the two widths of a round object.
 const ROUND_M: f32 = 0.005;
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along

@@ -48,7 +48,7 @@ struct NamedObject {
 struct DrawnStep {
     /// Held so that its address stays unique.
     step: Arc<Step>,
-    /// CameraView of each robot, once rendered.
+    /// View of each robot's camera, once it is rendered.
     views: Vec<Option<Arc<RobotView>>>,
 }
 
@@ -305,7 +305,7 @@ impl Observer {
         Ok(DepthReply { surfaces, ..no_depth(name, frame) })
     }
 
-    /// Returns true if a pixel of a view may see something, of which the camera has no depth.
+    /// Returns true if a pixel may show something although the camera has no depth for it.
     fn is_hole(&self, view: &RobotView, [u, v]: [i64; 2]) -> bool {
         let pixel = v as usize * view.picture.width as usize + u as usize;
         !self.cameras.are_ideal() && !view.depth_m[pixel].is_finite()

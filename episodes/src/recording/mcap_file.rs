@@ -29,7 +29,7 @@ pub struct McapFile {
     path: PathBuf,
     /// Buffer that messages share.
     buffer: Vec<u8>,
-    /// The same channels for those who watch.
+    /// The same channels for viewers.
     live: Option<Box<dyn LiveRecording>>,
 }
 
@@ -101,8 +101,8 @@ impl McapFile {
         written.map_err(|e| self.failed(e))
     }
 
-    /// Hands everything that has been written to the system, in whole chunks. It then survives the process
-    /// and can be read.
+    /// Flushes everything written so far to the system, in whole chunks. It then survives the process and can
+    /// be read.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.writer.flush().map_err(|e| self.failed(e))
     }
@@ -139,7 +139,7 @@ impl McapFile {
     }
 }
 
-/// Viewer of recordings, for example a server. It is told of every recording that begins.
+/// Viewer of recordings, for example a server. It is notified of every new recording.
 pub trait LiveViewer: Debug + Send + Sync {
     /// Returns the view of a recording that begins.
     fn begin(&self) -> Box<dyn LiveRecording>;
@@ -251,7 +251,7 @@ impl RecordingStore {
 /// then.
 fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
     let partial = partial_path(path);
-    // No lock on systems where it would also keep others from reading.
+    // Systems where a lock would also prevent others from reading have none.
     if !cfg!(unix) {
         return Ok((File::create(&partial)?, partial));
     }

@@ -84,7 +84,7 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let damage = loop {
         match data.next_part() {
             Ok(Some(part)) => copy.add(part, &bytes)?,
-            // The writer creates anew what follows the data.
+            // The writer recreates everything after the data section.
             Ok(None) => break None,
             Err(damage) => break Some(damage),
         }
@@ -167,7 +167,7 @@ impl RecoveredFile {
         Recording::from_bytes(partial, store.pending().to_vec())
             .and_then(|recording| recording.check_replayable())
             .map_err(|source| RecoverError::too_little(partial, source))?;
-        // The partial name is that of the source, so a third one serves meanwhile.
+        // The source has the partial name, so the copy has a third name meanwhile.
         write_whole_as(&partial.with_extension("recovering"), &self.path, store.pending())?;
         Ok(self.path)
     }

@@ -90,7 +90,7 @@ impl RecorderThread {
         self.catches_up = catches_up;
     }
 
-    /// Appends something after all earlier appends, within a short time.
+    /// Queues an append after all earlier ones. The recorder executes it within a short time.
     pub fn append(&self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static) {
         self.send(Append::Other(Box::new(append)));
     }
@@ -125,7 +125,7 @@ impl RecorderThread {
             sent => sent.is_ok(),
         };
         if !sent {
-            // If it has failed, it has already reported the reason.
+            // A recorder that has failed has already reported the reason.
             self.failed.get_or_init(|| PANICKED.into());
         }
     }

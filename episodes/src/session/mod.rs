@@ -74,7 +74,7 @@ pub struct Session {
     /// Number of requests: calls, with one for each plan. `None` in a replay, where the calls of plans
     /// are not marked.
     requests: Option<u32>,
-    /// Requests and thinking time of the operators, by robot, as the host says with their commands.
+    /// Requests and thinking time of the operators, by robot, as the host reports with their commands.
     operators: BTreeMap<String, OperatorUse>,
     /// True while the commands of a plan are made.
     planning: bool,

@@ -43,7 +43,7 @@ impl KeptClient {
             Arc::new(SharedClient { client, is_dropped: Mutex::new(false), dropped: Condvar::new() });
         let kept = shared.clone();
         let keeper = thread::Builder::new().name("policy's connection".into());
-        // Without a thread, the server has to be patient.
+        // If no thread can be started, pings of the server stay unanswered while the client is idle.
         let keeper = keeper.spawn(move || kept.keep_alive(every)).ok();
         KeptClient { shared, keeper }
     }

@@ -275,7 +275,7 @@ impl EpisodeTable {
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
         }
         match self.settings.assistance {
-            // How the score is counted is not part of the task.
+            // The counting of the score is not part of the task.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
             Assistance::Full => {}
         }
@@ -335,7 +335,7 @@ impl EpisodeTable {
         EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
-    /// Lists the episodes that are put aside until somebody asks for them, by id. A picture would wake them.
+    /// Lists the suspended episodes, by id. Rendering an image would wake them.
     pub fn asleep(&self) -> Vec<String> {
         let held = self.lock();
         let asleep = held.episodes.values().filter(|episode| episode.thread.sleeps());

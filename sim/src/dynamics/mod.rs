@@ -45,7 +45,7 @@ use sleep::SleepingContacts;
 use solving::Solver;
 use trees::Trees;
 
-/// All moving things of a world.
+/// All moving bodies of a world.
 pub struct Dynamics {
     pub settings: Settings,
     trees: Trees,

@@ -11,7 +11,7 @@ use super::geometry::between;
 use super::{BodyTree, Document, pose};
 use crate::SimError;
 
-/// Elements of which a described robot uses nothing.
+/// Elements that a described robot does not use.
 const LEFT_OUT: &[&str] = &["tendon", "pair", "deformable", "skin", "flex", "flexvert", "flexstrain"];
 
 impl Document {
@@ -65,7 +65,7 @@ impl Document {
         self.model.contact.excludes = excludes;
     }
 
-    /// Returns the tree of a document with one.
+    /// Returns the only tree of a document.
     pub(crate) fn robot_tree(&self) -> Result<BodyTree, SimError> {
         let tree = self.trees()?.into_iter().nth(1);
         tree.ok_or_else(|| self.unsupported("it has no body"))

@@ -17,8 +17,8 @@ pub fn plain_schema<T: JsonSchema>() -> Value {
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Returns the schema of `T` as arguments that a list of tools describes: where a policy is told less, in the
-/// texts for that, and where one policy directs all robots, without the fields that are for operators.
+/// Returns the schema of `T` as arguments in a list of tools. Its texts are those for the policy's
+/// assistance. If one policy directs all robots, the fields for operators are left out.
 pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     if wording.operators == Operators::One {
@@ -28,8 +28,8 @@ pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     schema
 }
 
-/// Returns the schema of `T` as a body that is read: what the checks refuse, it does not allow. How many
-/// control steps a command may have is still to be said.
+/// Returns the schema of `T` as a body that is parsed. It excludes what the checks refuse. The maximum number
+/// of control steps is added later.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     word(&mut schema, wording);

@@ -60,7 +60,7 @@ impl Threads {
             }
         });
         for helper in &self.helpers {
-            // A missing thread does no harm: every thread does what is left.
+            // A missing thread does no harm: the others do its jobs.
             let _ = helper.send(round.clone());
         }
         round(0);

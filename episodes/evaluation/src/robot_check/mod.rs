@@ -18,7 +18,7 @@ pub struct RobotCheck {
     pub falls: Option<String>,
 }
 
-/// Distance that a standing robot's pelvis moves in a second at most, on a G1.
+/// Maximum displacement of a standing G1's pelvis in one second.
 const MAX_MOVED_M: f32 = 0.1;
 
 /// Looks at a robot, and lets it stand for a second.

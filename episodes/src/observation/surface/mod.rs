@@ -45,7 +45,7 @@ pub struct CameraPoses {
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Returns the surfaces of these things, each with its ids, that pixels see, with their places in the list.
+/// Returns the visible surfaces of these objects, each given by its ids, with its index in the list.
 pub fn of_things(view: &RobotView, things: &[BTreeSet<u32>], poses: &CameraPoses) -> Vec<(usize, Surface)> {
     let relief = Relief::of(view);
     let surface = |(index, ids): (usize, &BTreeSet<u32>)| {

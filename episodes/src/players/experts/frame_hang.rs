@@ -79,7 +79,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
             }
             give_way(commander, false);
         }
-        // Take it off the way it came, and try once more with the grips as they are now.
+        // Takes the frame off the way it came, and tries once more with the present grips.
         let missed = commander.facts()?.object("frame").pose_in_world;
         let above_m = Vector::new(missed.translation.x, missed.translation.y, past.translation.z);
         let above = Pose::from_translation(above_m);

@@ -19,8 +19,8 @@ const LIFT_M: f32 = 0.07;
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.27;
-/// Distance, in a fist with its palm down, from the wrist to the part that presses; `FRONT_M` is that to
-/// the fist's front.
+/// Distance from the wrist to the part that presses, in a fist with its palm down. `FRONT_M` is the distance
+/// to the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
 /// Distance behind the lever at which the fist closes. The wrist then rises `ABOVE_LEVER_M` over the
@@ -81,7 +81,7 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     set_heights(commander, BENT_M);
-    // A walking robot's thighs meet the legs if the robot is off the middle behind them or too near.
+    // A walking robot's thighs hit the table's legs if the robot is too near or not centred behind them.
     team.gather_reaching(commander)?;
     grasp_reached(commander, &grasps)?;
     // Two robots that lift with stiff hands lean back against each other's pull, and stagger.

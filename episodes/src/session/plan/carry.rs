@@ -38,7 +38,8 @@ const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
 /// Compliance of hands that carry with partners.
 const COMPLIANCE_N_S_M: f64 = 250.0;
-/// Number of commands at the end of the path for corrections, and maximum number after them until rest.
+/// Number of commands for corrections at the end of the path, and maximum number of further commands until
+/// rest.
 const CORRECTING_COMMANDS: u32 = 4;
 const RESTING_COMMANDS: u32 = 12;
 /// Number of commands without a hold after which a hand has lost its object.

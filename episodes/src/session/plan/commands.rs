@@ -143,7 +143,7 @@ impl CommandList {
         }
     }
 
-    /// Returns the number of commands that have been begun, however many short ones each is made of.
+    /// Returns the number of commands that have been begun. The pieces of one command count once.
     pub fn begun(&self) -> u32 {
         self.begun as u32
     }

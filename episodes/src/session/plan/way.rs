@@ -191,7 +191,7 @@ mod tests {
         assert!((straight.at(0.5).at_m - Vector2::new(0.5, 1.0)).norm() < 1e-9, "{straight:?}");
     }
 
-    /// A robot whose every correction ends 1.5 cm behind gets closer with each.
+    /// Every correction of this robot ends 1.5 cm behind its place. It still gets closer with each.
     #[test]
     fn short_walks_make_up_for_what_they_miss() {
         let mut corrections = Corrections::default();

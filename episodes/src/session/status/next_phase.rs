@@ -27,8 +27,8 @@ impl Session {
     }
 }
 
-/// Returns the variants of a task that the instructions of an operator, or of the policy of all robots, do
-/// not tell from it.
+/// Returns the variants of a task that a reader cannot distinguish from it. The reader has the instructions
+/// of an operator, or those of the policy of all robots.
 fn alike<'a>(task: &'a Task, operator: Option<&str>) -> Vec<&'a TaskDefinition> {
     let read = |variant: &TaskDefinition| match operator {
         None => vec![variant.instruction.clone()],
@@ -42,8 +42,8 @@ fn alike<'a>(task: &'a Task, operator: Option<&str>) -> Vec<&'a TaskDefinition> 
     task.variants().iter().filter(|variant| read(variant) == own).collect()
 }
 
-/// Returns what phase number `index` of a task lacks, one sentence each, for a reader who cannot tell the
-/// task from the variants `alike`.
+/// Returns what phase number `index` of a task lacks, one sentence each, for a reader who cannot distinguish
+/// the task from the variants `alike`.
 fn lacks(
     task: &Task,
     alike: &[&TaskDefinition],
@@ -57,7 +57,7 @@ fn lacks(
         let (_, part) = &conditions[number].parts[place];
         others(number, place).iter().all(|other| other.is_some_and(|other| other.asks_the_same(part)))
     };
-    // Whether a condition has held in the past would reveal its withheld parts, too.
+    // The past state of a condition would reveal its withheld parts, too.
     let missing = |number: usize, has_held: bool| -> Vec<String> {
         let parts = conditions[number].parts.iter().enumerate();
         let sentences = parts.flat_map(|(place, (_, part))| match is_told(number, place) {
@@ -254,7 +254,7 @@ mod tests {
         }
     }
 
-    /// The facts about an object would tell B whether it is the one that is wanted.
+    /// The facts about an object would tell B whether it is the wanted one.
     #[test]
     fn what_is_kept_back_depends_on_nothing_that_the_reader_can_change() {
         let told: Vec<_> = (0..6).map(|seed| at_rest("which_one", seed, 0, Some("B"))).collect();

@@ -1,5 +1,5 @@
-//! Information for a policy. What its assistance withholds is removed from every reply here and nowhere
-//! else. Information beyond the benchmark's own policies is counted by kind and by robot.
+//! Information for a policy. Information that its assistance withholds is removed from every reply here and
+//! nowhere else. Information beyond the benchmark's own policies is counted by kind and by robot.
 
 mod short;
 
@@ -266,7 +266,7 @@ impl Session {
         called.allowed(|tool| self.check_told(tool))
     }
 
-    /// Refuses setpoints of motors where commands are executed otherwise than told.
+    /// Refuses setpoints of motors where the executed commands differ from the policy's.
     fn check_drives(&self, call: &ToolCall) -> Result<(), EpisodeError> {
         match call {
             ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {

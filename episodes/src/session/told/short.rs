@@ -1,4 +1,4 @@
-//! Short replies for language models: without everything that is as expected.
+//! Short replies for language models. They leave out everything that is as expected.
 
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{
@@ -114,7 +114,7 @@ fn shorten_report(reply: &mut CommandReply, executed_steps: u32, tells_pelvises:
     reply.phases.retain(|phase| phase.time_s > began_s);
     shorten_budget(&mut reply.budget);
     reply.robots.iter_mut().for_each(|report| shorten_robot(report, tells_pelvises));
-    // A robot with nothing to tell stands where it stood.
+    // A robot with nothing to report has not moved.
     reply.robots.retain(|report| *report != still(report));
 }
 
@@ -170,7 +170,7 @@ fn shorten_hand(hand: &mut HandReport) {
         (hand.position_error_m, hand.orientation_error_rad) = (None, None);
         hand.joints_at_limit.clear();
     }
-    // Fingers around a thing rest where it stops them, and all of them press.
+    // Fingers around an object rest where it stops them, and all of them press.
     if hand.grip == Some(Grip::TwoSided) {
         hand.presses.clear();
     }
@@ -220,7 +220,7 @@ mod tests {
         assert!(presses.get("largest_effort").is_none(), "{presses}");
         let blocked = left(hand("blocked", 9.0));
         assert_eq!((&blocked["position_error_m"], &blocked["target"]), (&json!(0.02), &json!(null)));
-        // Without a state that says that the hand is at its target, its pose is reported.
+        // The pose is reported unless the state says that the hand is at its target.
         let untold = left(HandReport { state: None, ..hand("idle", 0.0) });
         assert!(untold["measured"].is_object() && untold["position_error_m"].is_number(), "{untold}");
     }
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// A walk tells where the robot stands, and a plan does so in its lines.
+    /// A walk reports the robot's position, and a plan does so in its lines.
     #[test]
     fn plans_tell_the_phases_of_all_their_commands() {
         let plan = |executed_steps: u32, outcomes: &[&str]| {

@@ -133,7 +133,8 @@ pub fn silent(url: &str, within: Duration) -> RemoteError {
     RemoteError::Unreachable { url: url.into(), reason }
 }
 
-/// Returns the beginning of a page, of which `begun` came with its header. Waits briefly for the rest.
+/// Returns the beginning of a page. `begun` is the part that came with its header. Waits briefly for the
+/// rest.
 fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     if begun.is_empty()
         && let Ok(mut stream) = stream

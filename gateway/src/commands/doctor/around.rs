@@ -30,7 +30,7 @@ print(platform.python_version(), *found)";
 pub(super) const MIN_FREE_BYTES: u64 = 5_000_000_000;
 /// Lower limit for a correct clock: the beginning of 2026, when this program was written.
 pub(super) const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
-/// Difference between the clocks of a build machine and this one that is no mistake.
+/// Tolerated difference between the clocks of the build machine and this one.
 const MAX_DRIFT: Duration = Duration::from_secs(86_400);
 
 /// Hosts that clients on this machine use for a server on it.

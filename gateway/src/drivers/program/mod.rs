@@ -134,7 +134,7 @@ impl Program {
         let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
         let statuses: io::Result<Vec<String>> = groups.into_iter().map(ProcessGroup::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
-        // Of several programs nobody knows whose call it was.
+        // With several programs, the caller is unknown.
         let refusal = episode.last_refusal().filter(|_| participants.len() == 1);
         let found = exits.into_iter().zip(statuses).map(|((exit, env_steps), status)| {
             let refusal = refusal.clone().filter(|_| exit == ProgramExit::Failed);
@@ -158,8 +158,7 @@ impl Program {
                 if exit.is_none()
                     && let Some(well) = group.ended_well()?
                 {
-                    // A program that is found to have ended while the episode goes on has ended before
-                    // it.
+                    // If a program has ended and the episode still runs, the program ended first.
                     let found = match (episode.ended(), well) {
                         (true, _) => ProgramExit::After,
                         (false, true) => ProgramExit::Left,
@@ -180,8 +179,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // A program that left in order had done its part if the others completed the episode, or
-                // if one of them is to blame for its end.
+                // A program that exited normally had done its part if the others completed the episode, or if
+                // another program caused its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),

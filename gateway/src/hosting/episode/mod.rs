@@ -226,7 +226,7 @@ impl EpisodeThread {
         self.queue.work_unless_full(move |desk| desk.note(operator.as_deref(), note, key)).await
     }
 
-    /// Records a call that was refused before it arrived here, after its caller's earlier calls. A
+    /// Records a call that was refused before it reached the episode, after its caller's earlier calls. A
     /// failure is ignored.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, RefusedCall { tool, arguments, problem }) = (operator.map(str::to_owned), call);

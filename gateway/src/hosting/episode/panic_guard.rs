@@ -136,7 +136,7 @@ impl EpisodeMetrics {
         EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
     }
 
-    /// Continues counting an episode that has been counted up to the state of `session`.
+    /// Continues the counts of an episode that has been counted up to the state of `session`.
     pub fn again(metrics: Arc<Metrics>, session: &Session) -> EpisodeMetrics {
         EpisodeMetrics {
             metrics,
@@ -152,7 +152,7 @@ impl EpisodeMetrics {
         self.count(session);
     }
 
-    /// Counts what the session has done since it was last counted.
+    /// Counts the session's work since the last count.
     pub fn count(&mut self, session: &Session) {
         let (control_steps, physics) = (session.present().control_step, session.physics());
         let since = control_steps.saturating_sub(self.control_steps);

@@ -24,7 +24,7 @@ pub struct JobQueue {
 }
 
 impl JobQueue {
-    /// Creates the end of the channel `jobs`, whose thread plays the episode of `stage`.
+    /// Creates the sending end of the channel `jobs`, whose thread plays the episode of `stage`.
     pub fn new(stage: Arc<Stage>, jobs: mpsc::Sender<Job>) -> JobQueue {
         JobQueue { jobs: Mutex::new(jobs), stage }
     }
@@ -75,7 +75,7 @@ impl JobQueue {
 
     /// Queues a job, however many are waiting.
     pub async fn send_in_turn(&self, mut job: Job) -> Result<(), HostingError> {
-        // The episode may fall asleep between the two.
+        // The episode may fall asleep after `sender` has returned.
         while let Err(mpsc::error::SendError(unsent)) = self.sender()?.send(job).await {
             job = unsent;
         }

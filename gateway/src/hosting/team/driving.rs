@@ -125,7 +125,8 @@ async fn turn(any: OperatorHandle) {
     }
 }
 
-/// Commands a setpoint and sends the driver the answer, with the robot's state if it is told.
+/// Commands a setpoint and sends the driver the answer, with the robot's state if the driver has asked for
+/// it.
 async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool) {
     let mut answers = vec![operator.call(setpoint.call().into(), None).await];
     if tells_state {

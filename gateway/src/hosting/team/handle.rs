@@ -1,4 +1,4 @@
-//! The operator of one robot of an episode. Its calls block until its robot's reply is there.
+//! The operator of one robot of an episode. Its calls block until its robot's reply is ready.
 
 use std::sync::{Arc, MutexGuard};
 
@@ -156,7 +156,8 @@ impl OperatorHandle {
         }
     }
 
-    /// Finishes what has begun, even if its caller leaves, and keeps the answer to a call with a key.
+    /// Completes the work that has begun, even if its caller leaves, and keeps the answer to a call with a
+    /// key.
     pub(super) async fn finish_all(
         &self,
         keyed: Option<Keyed>,
@@ -177,8 +178,8 @@ impl OperatorHandle {
         self.round().goes_on(self.seat)
     }
 
-    /// Notes that the operator sends control steps in real time: its partners' commands go on over them, and
-    /// the steps' own time is no thinking.
+    /// Notes that the operator sends control steps in real time. Commands of its partners continue over these
+    /// steps, and the steps' own duration is not charged as thinking.
     pub fn pace(&self) {
         self.own(|own| {
             own.set_pace(TICK);
@@ -302,7 +303,8 @@ impl OperatorHandle {
         self.go_on();
     }
 
-    /// Restricts an answer to what the operator may see, and adds what it has not heard yet.
+    /// Restricts an answer to the parts that the operator may see, and adds the messages that it has not
+    /// received yet.
     fn own_answer(&self, answer: Answer) -> Answer {
         let (heard, thought) = self.own(|own| (own.take_heard(), own.thought()));
         let left_s = self.team.rules.thinking_limit.map(|limit| to_ms(limit.saturating_sub(thought)));

@@ -1,9 +1,9 @@
 //! The operators of an episode in which each robot has its own.
 //!
-//! A step is made when every operator has commanded, or when the others' patience with the missing ones
-//! ends. Then the robots of the silent operators hold still, and nobody waits for them until they call
-//! again. The shortest of the commands ends them all. Each operator has a clock of its own. An operator's
-//! call blocks until its robot's reply is there.
+//! A step is made once every operator has commanded, or the time limit for the missing ones is over. Robots
+//! of silent operators then hold still, and nobody waits for these operators until they call again. All
+//! commands end with the shortest one. Each operator has a clock of its own. An operator's call blocks until
+//! the reply for its robot is ready.
 
 mod clock;
 mod collection;

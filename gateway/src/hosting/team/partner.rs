@@ -145,7 +145,7 @@ fn play_policy(
     };
     let operator = own.operator.clone();
     let mut connected = || {
-        // The policy's first look shows all that has happened until now.
+        // The policy's first observation includes everything that has happened until now.
         operator.own(Operator::has_looked);
         answer(Ok(()));
     };

@@ -395,7 +395,7 @@ impl Operator {
         Presence { robot: self.robot.clone(), state, thinking_s }
     }
 
-    /// Lets nobody wait for it any more until it calls again, if it thinks.
+    /// Stops the others from waiting for it until it calls again, if it is thinking.
     pub fn fall_silent(&mut self) {
         if let OperatorState::Thinking = self.state {
             self.state = OperatorState::Silent;

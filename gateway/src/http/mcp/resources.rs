@@ -107,7 +107,8 @@ pub async fn read(app: &AppState, caller: &Caller, uri: &str) -> Result<ReadReso
     Ok(ReadResourceResult::new(vec![ResourceContents::text(text, uri)]))
 }
 
-/// Returns the pages that policies of this server may read: they speak of what only `full` tells.
+/// Returns the pages that policies of this server may read: they describe information that only `full`
+/// includes.
 fn pages(app: &AppState, caller: &Caller) -> Vec<Page> {
     let of_operators = matches!(caller, Caller::Operator { .. }).then_some(OPERATORS);
     match app.settings.assistance {

@@ -68,7 +68,7 @@ impl Fitting {
         self.refused.push(self.wrong(what));
     }
 
-    /// Returns all reasons with a last one.
+    /// Adds a last reason and returns all of them.
     fn all_with(&mut self, error: SimError) -> SimError {
         self.refused.push(error);
         SimError::several(std::mem::take(&mut self.refused))

@@ -33,8 +33,8 @@ pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec
     in_published_order(joints).map_err(|what| document.unsupported(what))
 }
 
-/// Returns the joints in published order, including rigid ones for those that the robot lacks. The text
-/// of an error says what would be right.
+/// Returns the joints in published order, including rigid ones for those that the robot lacks. The text of an
+/// error states the requirement.
 pub(super) fn in_published_order(mut found: Vec<JointModel>) -> Result<Vec<JointModel>, String> {
     let names = joint_names();
     if let Some(other) = found.iter().find(|joint| !names.contains(&joint.name)) {

@@ -114,7 +114,7 @@ impl JointSources<'_> {
         };
         let given = described.effort_n_m.get(name).copied();
         let effort = given.or(of_file).or(like.as_ref().map(|like| like.effort_n_m));
-        // The joints without a limit are told together.
+        // The joints without a limit are reported together.
         let without = if wrong.is_empty() { 0.0 } else { 1.0 };
         (self.joint_model(joint, link, limits, effort.unwrap_or(without), like.as_ref()), wrong)
     }

@@ -71,9 +71,9 @@ pub struct Surface {
     pub sleeps_there: bool,
 }
 
-/// Distance by whose whole multiples the shape of an endless collider is moved. The shape has to extend
-/// farther than this beyond what it meets. Between two moves it stays still, so that contact points
-/// continue those of the step before.
+/// Step of the places to which the shape of an endless collider is moved. The shape extends farther than one
+/// step beyond what it meets. Between two moves it stays still, so that contact points continue those of the
+/// step before.
 const TILE_M: f64 = 32.0;
 /// Half extent of an endless collider's bounds.
 const ENDLESS_M: f64 = 1e6;

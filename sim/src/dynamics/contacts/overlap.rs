@@ -78,8 +78,9 @@ impl<'a> Overlap<'a> {
         of_a.chain(of_b).chain(last)
     }
 
-    /// Returns the first of the least overlaps along normals. The search for outermost points is slow for hulls
-    /// of many corners. It is left out where points that were found for other normals already overlap by more.
+    /// Returns the least overlap along the normals; of equal ones, the first. The search for outermost points
+    /// is slow for hulls of many corners. A normal is skipped if points that were found for other normals
+    /// already overlap by more.
     fn least(&self, normals: impl Iterator<Item = Vector>) -> Option<Along> {
         let mut known: [[Vector; 2]; REMEMBERED] = Default::default();
         let mut found = 0;

@@ -1,4 +1,4 @@
-//! Layers of materials: textures with roles, put together to one image each for colour, gloss, relief and
+//! Layers of materials: textures with roles, combined into one image each for colour, gloss, relief and
 //! emitted light.
 
 use std::collections::BTreeMap;

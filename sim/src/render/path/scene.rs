@@ -223,8 +223,8 @@ impl Scene<'_> {
         }
     }
 
-    /// Returns the light that arrives at a point from a direction, of one path. Coats of what it meets
-    /// are left out, except for the light that they keep out.
+    /// Returns the light of one path that arrives at a point from a direction. Reflections in the coats of
+    /// surfaces on the way are left out, but not the light that coats keep out.
     pub fn arriving_rgb(
         &self,
         mut start_m: Vector,

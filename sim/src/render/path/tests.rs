@@ -50,7 +50,7 @@ fn depth_and_ids_are_those_of_the_embedded_renderer() {
     let (mut path, mut embedded) =
         (PathRenderer::new(Prepared::new(Scenery::of(&world))), cpu(Scenery::of(&world)));
     let commands = [world.rest_command(0), world.rest_command(1)];
-    // Twice, to verify that moved parts are at their new poses.
+    // The images are drawn twice, to verify that moved parts are at their new poses.
     for _ in 0..2 {
         let step =
             (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");

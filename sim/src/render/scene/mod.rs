@@ -163,7 +163,7 @@ impl Scenery {
         }
         let lamps = world.lights().map(lamps);
         let focus_radius_m = if lamps.is_some() { LAMPS_FOCUS_RADIUS_M } else { FOCUS_RADIUS_M };
-        // As in MuJoCo, nothing is behind a scene with lights that has no sky.
+        // As in MuJoCo, a scene with lights and without a sky has no background.
         let dark = || lamps.is_some().then(|| Arc::new(Texture::plain([0; 3])));
         let sky = world.sky().cloned().or_else(dark);
         Scenery { parts, focus_radius_m, light: Light::default(), lamps, room, sky }

@@ -113,7 +113,7 @@ impl Prepared {
     /// Returns the id of a sheet in images.
     #[inline(always)]
     pub fn id(&self, sheet: u32) -> u32 {
-        // No sheet has the number of nothing.
+        // No sheet has the number that marks a sample without a surface.
         self.ids.get(sheet as usize).copied().unwrap_or(0)
     }
 }

@@ -14,7 +14,8 @@ const FOCAL_PX: f32 = 645.0;
 pub const DISPARITY_PX_M: f32 = FOCAL_PX * BASELINE_M;
 /// Steps of the disparity in a pixel.
 pub const STEPS: f32 = 32.0;
-/// Standard deviation of the disparity: assumed, so that depth is within the 2 % at 2 m of the datasheet.
+/// Standard deviation of the disparity. It is assumed such that the error of depth is within the datasheet's
+/// 2 % at 2 m.
 pub const NOISE_PX: f32 = 0.08;
 /// Depth within which there is any: the datasheet's minimum at full resolution, and its maximum.
 pub const RANGE_M: [f32; 2] = [0.28, 10.0];

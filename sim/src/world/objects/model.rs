@@ -61,7 +61,7 @@ impl ObjectPart {
     fn of_scene(scene: &Document, body: &str, name: &str) -> Result<ObjectPart, SimError> {
         let SceneBody { link, carrier, .. } = scene.scene_body(body)?;
         let mut model = ObjectModel::of(&link);
-        // A motion against a body without a name of its own could not be told.
+        // A motion relative to a body without a name of its own could not be described.
         if carrier.as_ref().is_some_and(|carrier| scene.scene_body(carrier).is_err()) {
             model.opening = None;
         }

@@ -67,7 +67,7 @@ fn check_survives(model: &Arc<RobotModel>, case: &str) {
 }
 
 /// The order of the joints in a limb changes nothing in what a robot can do: controller, loads on hands and
-/// frames of feet go by the tree.
+/// frames of feet depend on the tree alone.
 #[test]
 fn joints_of_a_limb_may_have_any_order() {
     for (first, second, case) in [

@@ -65,7 +65,7 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
     assert!(told.contains("further ones, which are added to it (--shard I/N"), "{told}");
     assert_eq!(std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap(), before);
 
-    // The same run continues, and so does one with more of the same.
+    // The same run continues, and so does a run with additional tasks or seeds.
     let kept = |plan: &EvaluationPlan| {
         let KeptEpisodes { kept, to_play, .. } = EvaluationRun::begin(plan, folder.path()).unwrap().kept();
         (kept, to_play)

@@ -6,7 +6,7 @@ use super::Table;
 const MAX_PAGE_ROWS: usize = 40;
 /// Length from which a column's texts are broken into lines, in characters.
 const LONG_TEXT_CHARS: usize = 36;
-/// Command that scales what follows down to the width of the text, and up never.
+/// Command that scales the following table down to the width of the text if it is wider.
 const WITHIN_THE_PAGE: &str = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}";
 
 /// Renders a table with its title and note as the caption.

@@ -155,8 +155,8 @@ impl<'a> CarryTeam<'a> {
         Err(PlayerError::GaveUp("hands lost the load again and again".into()))
     }
 
-    /// Takes the held object through stops, world frame; `pace_m_s` is that of the robot that has farthest
-    /// to walk.
+    /// Carries the held object through stops in the world frame. `pace_m_s` is the pace of the robot with the
+    /// longest way.
     pub fn carry_by(
         &mut self,
         commander: &mut Commander,

@@ -17,12 +17,12 @@ const MAX_STRAY_M: f32 = 0.02;
 /// Probability at level 1 that a free hand misses after a long way, and the range of the error.
 const MISSES: f32 = 0.12;
 const MISS_M: [f32; 2] = [0.01, 0.03];
-/// Least length of a long way: no object that is to be grasped is as near.
+/// Minimum length of a long way. Every object to be grasped is farther away.
 const LONG_WAY_M: f32 = 0.12;
 /// Time that a hand which has missed needs to come back.
 pub const COME_BACK_S: f32 = 0.5;
 
-/// Constant that separates this random stream from the one with which the same seed places things.
+/// Constant that separates this random stream from the one with which the same seed places objects.
 const STREAM: u64 = 0x7661_7269_6574_7931;
 
 /// Random source of a demonstration's variation.

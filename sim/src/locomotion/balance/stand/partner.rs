@@ -25,8 +25,8 @@ use crate::plane::flat;
 const BEGINS_1_S: f32 = 2.0;
 /// Rate at which a hold ends: fingers that slip on an edge press again within a moment.
 const ENDS_1_S: f32 = 1.0;
-/// Pull (38 N on a G1) and its duration from which on it is the world's, and the share of that pull down
-/// to which it remains so.
+/// Minimum pull on the hands (38 N on a G1) and minimum duration of a pull that counts as the world's. It
+/// counts so until it is below the given share of that pull.
 const STRONG_M_S2: f32 = 1.1;
 const STRONG_S: f32 = 0.1;
 const STILL_STRONG: f32 = 0.5;

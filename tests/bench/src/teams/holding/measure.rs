@@ -9,7 +9,7 @@ use tandem_sim::{CONTROL_HZ, Step, Vector};
 pub(super) struct HoldResult {
     /// Largest horizontal distance of a pelvis from its place at the command to stand, or to set down.
     pub drift_m: f32,
-    /// The same, from its place [`RESTS_AFTER_S`] later.
+    /// The same distance, from its place [`RESTS_AFTER_S`] after the command.
     pub late_drift_m: f32,
     /// The same for the point at which the object is held, averaged over each second.
     pub load_drift_m: f32,

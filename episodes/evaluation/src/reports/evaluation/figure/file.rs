@@ -30,7 +30,7 @@ const TITLE_PX: f64 = 26.0;
 const LEGEND_LINE_PX: f64 = 20.0;
 /// Largest number of drawings beside each other.
 const MAX_COLUMNS: usize = 3;
-/// Width of a letter of the legend, at most.
+/// Maximum width of a letter in the legend.
 const LETTER_PX: f64 = 8.5;
 /// Width of the mark before a line of the legend.
 const MARK_PX: f64 = 36.0;

@@ -27,8 +27,8 @@ pub struct CylinderGrasp<'a> {
 }
 
 impl CylinderGrasp<'_> {
-    /// Returns the wrist motion to the grip of the object, if that were upright and raised by `raise_m`.
-    /// The hand stays `standoff_m` short of it.
+    /// Returns the wrist motion to the grip of the object, as if the object were upright and raised by
+    /// `raise_m`. The hand stays `standoff_m` short of it.
     fn grip(
         &self,
         commander: &mut Commander,
