@@ -101,7 +101,7 @@ impl LiveViewer for FoxgloveServer {
             let number = shown.number + 1;
             (number, mem::replace(&mut *shown, Shown { number, ..Shown::default() }))
         };
-        // A channel that closes calls its clients, who may be asking for messages at the same time.
+        // Closing a channel calls its clients, and these may be requesting messages at the same time.
         before.channels.iter().for_each(|shown| shown.channel.close());
         if let Some(server) = self.0.server.get() {
             server.clear_session(None);
@@ -150,7 +150,7 @@ impl LiveRecording for ShownRecording {
     }
 }
 
-/// Sends what is kept of a channel to clients that subscribe to it.
+/// Sends the stored messages of a channel to clients that subscribe to it.
 struct Latecomers(Weak<Shared>);
 
 impl ServerListener for Latecomers {

@@ -33,7 +33,7 @@ pub enum RefusalClass {
     Forbidden,
     /// The request names something that exists no longer.
     Gone,
-    /// Another server has what the request names.
+    /// Another server has the object of the request.
     Elsewhere,
     /// The caller asks for more than there is room for.
     TooMany,

@@ -18,7 +18,7 @@ const PLACE_STEPS: u32 = 15;
 const STAYS_M: f32 = 0.03;
 /// Height below which robots stand on the floor.
 const FEET_M: f32 = 0.08;
-/// Greatest mass of a body that robots are asked to lift.
+/// Maximum mass of a body that robots are asked to lift.
 const MAX_LIFTED_KG: f32 = 4.0;
 /// Distances and headings from a body at which a robot is tried, and its least distance from the other.
 const DISTANCES_M: [f32; 5] = [0.4, 0.5, 0.65, 0.85, 1.1];

@@ -23,9 +23,9 @@ const LZ4_MOST_EXPANSION: u64 = 255;
 /// repeated.
 const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
-/// Largest size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
+/// Maximum size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
 const MAX_CHUNK_BYTES: u64 = 256 << 20;
-/// Largest size of all chunks together, decompressed.
+/// Maximum size of all chunks together, decompressed.
 const MAX_RECORDS_BYTES: u64 = 16 << 30;
 
 /// Prefix of the library name in the header of every recording by Tandem, followed by a version. These

@@ -15,13 +15,13 @@ use crate::output::OutputError;
 /// waits for the reply.
 const GATHERED: Duration = Duration::from_millis(250);
 
-/// Largest number of pending appends before the episode waits for the recorder.
+/// Maximum number of pending appends before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
 
 /// Steps that are handed to the system in one go: fewer would make chunks that compress badly.
 const GATHERED_STEPS: usize = 12;
 
-/// Largest number of steps that a killed process loses. At this number, the episode waits until the system
+/// Maximum number of steps that a killed process loses. At this number, the episode waits until the system
 /// has them.
 const UNWRITTEN_STEPS: usize = 25;
 

@@ -31,7 +31,7 @@ impl Session {
     }
 
     pub(super) fn budget(&self) -> Budget {
-        // The host keeps the operators' clocks, and says in their replies what is left.
+        // The host keeps the operators' clocks, and reports the remaining time in their replies.
         let clock_left = match self.spec().operators {
             Operators::One => self.clock.left(),
             Operators::PerRobot => self.rules.thinking,

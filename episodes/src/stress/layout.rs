@@ -36,7 +36,7 @@ fn files() -> &'static Distractors {
     })
 }
 
-/// Largest distance between an object's lowest point and the top of its support.
+/// Maximum distance between an object's lowest point and the top of its support.
 const CONTACT_M: f32 = 0.015;
 /// Free space beside a distractor; `ABOVE_M` is that above the support.
 const BESIDE_M: f32 = 0.03;
@@ -44,7 +44,7 @@ const ABOVE_M: f32 = 0.01;
 /// Number of placement attempts for each distractor.
 const DRAWS: usize = 400;
 
-/// Least distances of a distractor on one kind of support from relevant things.
+/// Minimum distances of a distractor on one kind of support from relevant things.
 struct Clearance {
     /// Distance from middle to middle, minus both radii.
     object_m: f32,
@@ -53,7 +53,7 @@ struct Clearance {
     robot_m: f32,
     /// Distance from the lines from robots to objects.
     reach_m: f32,
-    /// Largest distance from the task's middle.
+    /// Maximum distance from the task's middle.
     farthest_m: f32,
 }
 

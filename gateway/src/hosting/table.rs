@@ -49,13 +49,14 @@ pub struct EpisodeTable {
 /// Purpose of a server, and the policy that can drive beside people.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Purpose of the server, which decides who starts episodes and drives their robots.
+    /// Purpose of the server, which determines the clients that start episodes and the drivers of their
+    /// robots.
     pub purpose: Purpose,
     /// Policy that drives a robot on request of a person; pages cannot name another one.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// The purpose of a server. It decides who starts episodes, and who may drive their robots.
+/// The purpose of a server. It determines the clients that start episodes and the drivers of their robots.
 #[derive(Debug, Clone, Default)]
 pub enum Purpose {
     /// Clients start episodes and choose the drivers.

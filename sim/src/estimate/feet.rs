@@ -37,7 +37,7 @@ const LIFTED_N: f32 = 40.0;
 const STANDING_N: f32 = 110.0;
 const FORCE_FILTER_TIME_S: f32 = 0.006;
 const PRESSURE_FILTER_TIME_S: f32 = 0.015;
-/// Height above the other foot from which on a foot does not stand.
+/// Height above the other foot at which a foot no longer stands.
 const HIGHER_M: f32 = 0.012;
 /// Damping of the least squares for a wrench: a stretched leg cannot feel along itself.
 const WRENCH_DAMPING: f32 = 2e-4;

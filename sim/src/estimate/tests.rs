@@ -125,7 +125,7 @@ fn a_prediction_is_the_product_of_three_matrices() {
     check(&covariance, &product(&product(&step, &before), &transposed));
 }
 
-/// By the textbook, and for considered errors by Joseph's form.
+/// The textbook's formula, and for considered errors Joseph's form.
 #[test]
 fn a_measurement_is_josephs_form() {
     for considered in [&[][..], &[TURN + 2, GYRO_BIAS + 2][..]] {

@@ -26,7 +26,7 @@ pub(super) struct HandLoads {
     payload: Sides<Payload>,
     /// Force of the world on each hand.
     force: Sides<HandForce>,
-    /// The same with the inertia of the moving arm.
+    /// This force with the inertia of the moving arm included.
     reaction: Sides<HandForce>,
     grip: Sides<Grip>,
 }

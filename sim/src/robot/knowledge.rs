@@ -185,7 +185,7 @@ mod tests {
         }
         assert!((sensed.com_m - body.com_m).length() < 1e-4);
         let error_m_s = (sensed.com_velocity_m_s - body.com_velocity_m_s).length();
-        // To the order of one physics step.
+        // They agree to the order of one physics step.
         assert!(error_m_s < 0.01, "{} {}", sensed.com_velocity_m_s, body.com_velocity_m_s);
     }
 }

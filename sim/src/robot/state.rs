@@ -48,8 +48,8 @@ pub struct RobotTruth {
     pub world_from_wrist: Sides<Pose>,
     /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub world_from_camera: Pose,
-    /// The same one control step earlier; `None` before the first step and where it is not known. Recordings
-    /// leave it out, since the step before has it.
+    /// Pose of the camera one control step earlier; `None` before the first step and where it is not known.
+    /// Recordings leave it out, since the step before has it.
     #[serde(skip)]
     pub world_from_camera_before: Option<Pose>,
     /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true: nothing puts a

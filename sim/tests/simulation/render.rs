@@ -136,7 +136,7 @@ fn sphere_depth_is_that_of_the_ray() {
         0.008,
         |ray| {
             // |depth * ray + distance * z|^2 = radius^2, the nearer solution;
-            // rays that graze the sphere are left out.
+            // Rays that graze the sphere are left out.
             let (a, b) = (ray.length_squared(), -distance_m);
             let discriminant = b * b - a * (distance_m * distance_m - radius_m * radius_m);
             (discriminant > 0.5 * radius_m * radius_m).then(|| (-b - discriminant.sqrt()) / a)
@@ -188,7 +188,7 @@ fn ids_name_the_nearest_thing() {
         (Vector::new(-0.3, 0.0, 0.0), 1),
         (Vector::new(0.24, 0.06, 0.2), 2),
         (Vector::new(0.3, 0.0, 0.55), 3),
-        // Below the sphere, which hides the box.
+        // This pixel is below the sphere, which hides the box.
         (Vector::new(0.3, 0.0, 0.2), 2),
     ] {
         let hidden = id == 2 && point_m.x == 0.3;

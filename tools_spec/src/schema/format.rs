@@ -105,7 +105,7 @@ impl ToolSpec {
         let mut tool = self.of_mcp();
         if self.has_structure() {
             tool["outputSchema"] = match self.name {
-                // An operator who leaves before the others gets a status in place of the result.
+                // An operator that leaves before the others gets a status in place of the result.
                 Finish::NAME => json!({ "type": "object" }),
                 _ => outline(&self.reply_schema),
             };

@@ -21,7 +21,7 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Map<String, Value>,
-    /// The same with the defaults of what may be left out.
+    /// This schema with the defaults of optional fields.
     #[serde(skip)]
     with_defaults: Map<String, Value>,
     /// The schema of [`ToolSpec::body_schema`], where fields that count control steps are only marked.

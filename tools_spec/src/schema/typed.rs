@@ -10,7 +10,7 @@ use crate::tool::Tool;
 /// Every tool, and the types that their arguments and replies are made of.
 #[derive(Debug, Clone)]
 pub struct TypedTools {
-    /// In the order in which policies meet them.
+    /// Tools in the order in which policies see them.
     pub tools: Vec<TypedTool>,
     /// JSON Schema of each type by its name, which `#/$defs/NAME` refers to.
     pub types: Map<String, Value>,

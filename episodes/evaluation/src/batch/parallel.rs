@@ -121,7 +121,7 @@ mod tests {
         let (first, second) = (slow(), slow());
         let of = |ids: &[thread::ThreadId]| ids.iter().map(|id| format!("{id:?}")).collect::<BTreeSet<_>>();
         assert_eq!((of(&first).len(), of(&first)), (2, of(&second)));
-        // All but the slow job are done by the other thread long before that one ends.
+        // The other thread finishes all other jobs long before the slow one ends.
         assert!(first[1..].iter().all(|id| *id == first[7] && *id != first[0]), "{first:?}");
     }
 

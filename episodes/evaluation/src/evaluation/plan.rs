@@ -276,7 +276,7 @@ impl EvaluationPlan<'_> {
     }
 }
 
-/// Largest number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
+/// Maximum number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
 /// export`.
 const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
 

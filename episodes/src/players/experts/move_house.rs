@@ -55,7 +55,7 @@ const BESIDE_Y_M: f32 = -0.75;
 const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
 /// Position of A beside its partners' way, door frame.
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
-/// Largest speed of A on its way to the lever, and to its place aside.
+/// Maximum speed of A on its way to the lever, and to its place aside.
 const APPROACH_M_S: f32 = 0.4;
 const WALK_M_S: f32 = 0.3;
 

@@ -324,10 +324,10 @@ impl CallMoment {
     }
 }
 
-/// Longest recorded arguments of a call that was refused before it reached the episode: a caller may send
-/// anything.
+/// Maximum length of the recorded arguments of a call that was refused before it reached the episode. A
+/// caller may send anything.
 const MAX_UNREAD_BYTES: usize = 10_000;
-/// Longest recorded name of a tool that may not exist.
+/// Maximum length of the recorded name of a tool that may not exist.
 const MAX_NAME_BYTES: usize = 100;
 
 /// Returns the beginning of a text that is too long; `None` if it is short enough.

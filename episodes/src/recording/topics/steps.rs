@@ -151,7 +151,7 @@ impl StepDecoder {
         step.map(|step| self.with_cameras_before(step))
     }
 
-    /// Completes a step with what the step before has.
+    /// Completes a step with parts of the step before.
     fn with_cameras_before(&mut self, mut step: Step) -> Step {
         let poses = step.robots.iter().map(|robot| robot.truth.world_from_camera).collect();
         let before = self.cameras.replace((step.control_step, poses));

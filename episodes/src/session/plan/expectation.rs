@@ -19,7 +19,7 @@ pub struct PartnerNews {
 }
 
 impl PartnerNews {
-    /// Returns who has spoken, as a reason to end; `None` if nobody has.
+    /// Returns the operators that have sent a message, as a reason to end; `None` if there are none.
     pub fn words(&self) -> Option<String> {
         let speakers: Vec<&str> = self.heard.iter().map(String::as_str).collect();
         (!speakers.is_empty()).then(|| format!("{} has spoken", speakers.join(" and ")))

@@ -224,7 +224,7 @@ mod tests {
             places.iter().map(|place| [place.at_m.x, place.at_m.y, place.heading_rad]).collect()
         };
         assert_eq!(told(Stand::START), [[0.5, 0.0, 0.2], [1.0, 0.0, 1.5], [1.0, 1.0, 1.5]]);
-        // A frame that faces left: what is ahead in it is to the left. The present heading stays as it is.
+        // This frame faces left, so places ahead in it are to the left. The present heading stays as it is.
         let quarter_rad = std::f64::consts::FRAC_PI_2;
         let expected = [[2.0, 0.5, 0.2], [2.0, 1.0, 1.5 + quarter_rad], [1.0, 1.0, 1.5 + quarter_rad]];
         let found = told(stand(2.0, 0.0, quarter_rad));

@@ -230,7 +230,7 @@ mod tests {
         lacks(&task, &alike, phase, &PhaseMemory::default(), &Facts::at_rest(&task))
     }
 
-    /// Only A, and a policy of all robots, are told the pad for the bottle.
+    /// The pad for the bottle is known only to A and to a policy of all robots.
     #[test]
     fn what_the_seed_chooses_is_told_to_whose_instructions_name_it() {
         let kept_back = "within_box(\"bottle\", \"[red / yellow / blue]_pad\", 0.06): not told, since your \
@@ -254,7 +254,7 @@ mod tests {
         }
     }
 
-    /// The facts about an object would tell B whether it is the wanted one.
+    /// The facts about an object would reveal to B whether it is the wanted one.
     #[test]
     fn what_is_kept_back_depends_on_nothing_that_the_reader_can_change() {
         let told: Vec<_> = (0..6).map(|seed| at_rest("which_one", seed, 0, Some("B"))).collect();

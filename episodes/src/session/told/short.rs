@@ -96,7 +96,7 @@ fn shorten_budget(budget: &mut Budget) {
 /// Shortens the reply to a plan or a walk like [`shorten`].
 pub fn shorten_plan(reply: &mut PlanReply) {
     reply.tool_calls = None;
-    // The lines of a plan tell which robots have walked, and where to; a walk has none.
+    // The lines of a plan state the walks of robots and their ends; a single walk has no lines.
     let tells_pelvises = reply.outcomes.is_empty();
     shorten_report(&mut reply.last, reply.executed_steps, tells_pelvises);
 }
@@ -140,7 +140,7 @@ fn still(report: &RobotReport) -> RobotReport {
     RobotReport { robot: robot.clone(), frame: *frame, left, right, ..RobotReport::default() }
 }
 
-/// Returns true for a base that stands as commanded, and has stood.
+/// Returns true for a base that stands as commanded, and did so throughout.
 fn stands(base: &BaseReport) -> bool {
     let BaseReport { state, pelvis_height_m: _, commanded_height_m, comes_to_rest_m, displaced_m, stepped } =
         base;

@@ -92,7 +92,7 @@ impl Desk {
         self.session.run(work).flatten()
     }
 
-    /// Runs `work` on the session and writes what it has done to the journal.
+    /// Runs `work` on the session and writes its effects to the journal.
     pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
         let done = self.on_session(work);
         self.commit(None);
@@ -135,7 +135,7 @@ impl Desk {
         kept
     }
 
-    /// Writes to the journal what has been done and the answers to calls with a key.
+    /// Writes the executed work to the journal, with the answers to calls that have a key.
     pub fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
         self.commit_noted(answers, None);
     }

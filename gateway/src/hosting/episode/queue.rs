@@ -140,6 +140,6 @@ pub fn job<T: Send + 'static>(
     work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
 ) -> (Job, oneshot::Receiver<Outcome<T>>) {
     let (reply, outcome) = oneshot::channel();
-    // What is done stays done if the caller has gone.
+    // Work that is done stays done even if the caller has gone.
     (Box::new(move |desk| drop(reply.send(desk.and_then(work)))), outcome)
 }

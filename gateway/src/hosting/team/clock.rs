@@ -2,7 +2,7 @@
 //!
 //! It begins with the operator's first request. It is paused while the operator's command waits or is
 //! executed, and once nobody waits for the operator any more. Each operator has the whole limit of the
-//! protocol. An operator in real time, who commands once in a control step, thinks only beyond that step.
+//! protocol. An operator in real time commands once in a control step, and thinks only beyond that step.
 
 use std::time::{Duration, Instant};
 

@@ -88,7 +88,7 @@ impl OperatorHandle {
         self.episode.ask(Some(self.robot()), call, keyed, then).await
     }
 
-    /// Notes that the operator has looked, and adds to a status what the others do.
+    /// Notes that the operator has observed, and adds the actions of the others to a status.
     fn looked(&self, answer: Answer) -> Answer {
         let mut round = self.round();
         round.operators[self.seat].has_looked();

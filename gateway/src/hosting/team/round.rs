@@ -150,7 +150,7 @@ impl Round {
             || self.others(seat).any(|operator| operator.paced)
     }
 
-    /// Returns what the operators on other seats than `seat` do.
+    /// Returns the actions of the operators other than that of `seat`.
     pub fn presence(&self, seat: usize) -> Vec<Presence> {
         self.others(seat).map(Operator::presence).collect()
     }
@@ -197,7 +197,7 @@ impl Round {
         thinking.map(|operator| operator.robot.clone()).collect()
     }
 
-    /// Returns the state of the operators on other seats than `seat`.
+    /// Returns the states of the operators other than that of `seat`.
     pub fn state_of_others(&self, seat: usize) -> Others {
         let all = |of: fn(&OperatorState) -> bool| self.others(seat).all(|operator| of(&operator.state));
         if all(|state| matches!(state, OperatorState::Finished)) {

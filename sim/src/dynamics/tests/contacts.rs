@@ -144,7 +144,7 @@ fn dynamics_endless_floor_carries_everywhere() {
         place_m.x - x_m
     };
     let slid_m = settled(0.0);
-    // From 15.9 m it slides from one part of the floor to the next.
+    // At 15.9 m it slides from one part of the floor to the next.
     for x_m in [15.9, 60.0, -700.0] {
         assert!((settled(x_m) - slid_m).abs() < 1e-3, "{} {slid_m}", settled(x_m));
     }

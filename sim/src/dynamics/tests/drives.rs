@@ -94,7 +94,8 @@ fn check_efforts(
     at: &super::super::TreeState,
     before: &[f64],
 ) -> bool {
-    // For a fast tree, energy that the integration made is removed (see `energy`), which no drive did.
+    // Of a fast tree, spurious energy of the integration is removed (see `energy`), which is no effort of a
+    // drive.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.solver.touches.is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return false;
@@ -143,7 +144,7 @@ fn motor(inertia_kg_m2: f64) -> (Bench, super::super::TreeId) {
 
 /// Returns the effort of a motor with this feedforward in a step that begins at this speed.
 fn effort_at(speed: f64, push_n_m: f64) -> f64 {
-    // So heavy that the speed is the same at the end of the step.
+    // The flywheel is so heavy that its speed is the same at the end of the step.
     let (mut bench, id) = motor(1e6);
     bench.dynamics.tree_mut(id).set_joint(0, 0.0, speed);
     bench.dynamics.tree_mut(id).drive(0, Drive { feedforward: push_n_m, ..Drive::NONE });

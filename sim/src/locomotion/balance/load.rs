@@ -36,7 +36,7 @@ pub(super) struct Load {
     pub moment_n_m: Vector,
     /// Centre of pressure of a robot at rest: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
-    /// The same without the push: the common centre of mass of the robot and its loads.
+    /// Centre of pressure without the push: the common centre of mass of the robot and its loads.
     pub weights_point_m: Vector,
     /// Velocity of the balance point due to changes of the push.
     pub balance_point_m_s: Vector,

@@ -43,7 +43,7 @@ impl Default for Gloss {
     }
 }
 
-/// Least roughness; less would be a mirror.
+/// Minimum roughness; a smoother surface would be a mirror.
 pub const MIN_ROUGHNESS: f32 = 0.05;
 /// Factor from shininess to the exponent of highlights.
 pub const SHININESS: f32 = 128.0;

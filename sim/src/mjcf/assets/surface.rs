@@ -29,7 +29,7 @@ pub struct SurfaceImage {
 /// Mapping from points of a geom's surface, in the geom's frame, to an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TextureMapping {
-    /// By the texture coordinates of the mesh's corners.
+    /// Mapping by the texture coordinates of the mesh's corners.
     Corners,
     /// Along z: `scale_1_m * (point - centre_m) - 0.5` in x and y are the coordinates to the right and down,
     /// of which a whole number more is the same place.

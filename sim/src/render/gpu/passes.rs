@@ -31,7 +31,7 @@ pub(super) struct Passes {
     pub first_veils: RenderPipeline,
     pub next_veils: RenderPipeline,
     pub resolve: ComputePipeline,
-    /// The same without depths and ids.
+    /// These passes without depths and ids.
     pub resolve_colours: ComputePipeline,
 }
 

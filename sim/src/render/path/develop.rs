@@ -1,4 +1,4 @@
-//! From light to the colours of an image: surfaces' own colours, smooth edges, exposure and tones.
+//! Conversion of light to the colours of an image: surfaces' own colours, smooth edges, exposure and tones.
 
 use rapier3d::math::Vector;
 
@@ -9,7 +9,7 @@ use crate::render::shading::lamps::linear_light;
 /// Linear value from which bright tones are compressed, and the value that becomes white.
 const KNEE_VALUE: f32 = 0.5;
 const WHITE_VALUE: f32 = 3.0;
-/// Least likeness of surfaces that share their light.
+/// Minimum likeness of surfaces that share their light.
 const ALIKE: f32 = 0.7;
 
 /// The light of an image, filtered.

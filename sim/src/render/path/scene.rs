@@ -15,7 +15,7 @@ use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::Affine;
 use crate::render::{Pattern, PlacedScenery};
 
-/// Most surfaces that light is reflected by after the one that is seen.
+/// Maximum number of surfaces that reflect light on a path, after the visible one.
 const MAX_BOUNCES: u32 = 4;
 /// Number of bounces after which a path may end early, by chance, and the greatest probability to go on.
 const SURE_BOUNCES: u32 = 1;
@@ -26,10 +26,10 @@ const MAX_PATH_VALUE: f32 = 6.0;
 /// of the distribution of its facets.
 const COAT: f32 = 0.04;
 const COAT_WIDTH_2: f32 = 0.015;
-/// Least roughness: what is smoother would show single paths.
+/// Minimum roughness: smoother surfaces would show single paths.
 const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
-/// Least cosine between the normal of a mirror and its mesh's z.
+/// Minimum cosine between the normal of a mirror and its mesh's z.
 const MIN_MIRROR_COSINE: f32 = 0.999;
 /// Width of the spots that reflect light on others, for images on them.
 const REFLECTED_WIDTH_M: f32 = 0.02;

@@ -260,7 +260,7 @@ impl<'a> PathView<'a> {
 }
 
 impl SeenSurface {
-    /// Returns the colour of what the surface reflects of white light: metal has its own.
+    /// Returns the colour of a surface's reflection of white light: metal has its own.
     pub fn coat_rgb(&self) -> Vector {
         Vector::ONE + (self.albedo - Vector::ONE) * self.gloss.metallic_factor
     }

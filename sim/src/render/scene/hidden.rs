@@ -47,7 +47,7 @@ impl Placed {
             mesh.vertices.iter().map(|corner| *body_from_mesh * corner.position_m).collect();
         let hull_m = (mesh.triangles.len() <= MAX_HULL_TRIANGLES)
             .then(|| hull_m(mesh, &corners_m))
-            // What is flat has no inside.
+            // A flat mesh has no inside.
             .filter(|faces_m| is_deeper(faces_m, centre_m, DEPTH_M))
             .filter(|faces_m| corners_m.iter().all(|corner_m| is_deeper(faces_m, *corner_m, -ROUNDING_M)));
         Placed { corners_m, centre_m, radius_m, hull_m }

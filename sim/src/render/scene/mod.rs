@@ -101,7 +101,7 @@ const ROOM_ID: u32 = 1;
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
-/// The same for lights of files: their scenes are seen as a whole.
+/// Focus for lights of files, whose scenes are seen as a whole.
 const LAMPS_FOCUS_RADIUS_M: f32 = 2.5;
 /// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
 /// into the room.
@@ -127,7 +127,7 @@ impl Lamps {
 }
 
 impl Part {
-    /// Returns true if what is behind shows through.
+    /// Returns true if surfaces behind it show through.
     pub fn is_veil(&self) -> bool {
         self.alpha < SOLID_ALPHA || self.is_cut_out()
     }

@@ -29,7 +29,7 @@ pub struct Prepared {
     pub images: Vec<Option<Image>>,
     /// True if layers of images change ambient light or emit light.
     pub has_layers: bool,
-    /// Parts that show what is behind them.
+    /// Parts that show the surfaces behind them.
     pub is_veil: Vec<bool>,
     /// Image of the sky.
     pub sky: Option<Image>,

@@ -19,7 +19,7 @@ pub const STEPS: f32 = 32.0;
 pub const NOISE_PX: f32 = 0.08;
 /// Depth within which there is any: the datasheet's minimum at full resolution, and its maximum.
 pub const RANGE_M: [f32; 2] = [0.28, 10.0];
-/// Depth is told in millimetres.
+/// Depth is reported in millimetres.
 const UNITS_1_M: f32 = 1000.0;
 
 /// Returns the depth that the camera measures; infinite where it measures none.

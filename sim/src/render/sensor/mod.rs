@@ -120,7 +120,7 @@ impl Shot {
         noise::mixed(u64::from(episode) << 32 | robot as u64) ^ noise::mixed(control_step + 1)
     }
 
-    /// Returns the image that a D435i takes of what an ideal camera of these intrinsics sees.
+    /// Returns a D435i's image of the view of an ideal camera with these intrinsics.
     fn d435i(&self, ideal: Frame, lens: &Intrinsics) -> Frame {
         let light = colour::SensorLight::of(&ideal.rgb, ideal.width, ideal.height);
         let map = LensMap::of(lens);

@@ -111,7 +111,7 @@ fn a_near_thing_has_a_hole_of_the_baseline_on_its_left() {
 
 #[test]
 fn colours_have_the_noise_of_their_electrons() {
-    // So dark that the gain is at its limit.
+    // The scene is dark, so that the gain is at its limit.
     let grey = vec![20; 3 * WIDTH * HEIGHT];
     let light = SensorLight::of(&grey, WIDTH as u32, HEIGHT as u32);
     let exposure = light.exposure();
@@ -129,7 +129,7 @@ fn colours_have_the_noise_of_their_electrons() {
         assert!((mean - f64::from(to_byte(value))).abs() < 0.5, "{mean} of colour {axis}");
         assert!(deviation > 2.0, "one would see it: {deviation}");
     }
-    // Twice the electrons have half the variance, relative to the square of their number.
+    // With twice the electrons, the variance relative to the square of their number is half.
     let variance = |gain| Exposure { time_s: 0.02, gain }.variance(HEIGHT as u32)[1][0];
     assert!((variance(4.0) / variance(2.0) - 2.0).abs() < 1e-5);
 }

@@ -45,7 +45,7 @@ const LIGHT_VALUES: usize = 256 * LIGHT_STEPS;
 static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
     LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
 
-/// Least number along the surface's own normal in a relief.
+/// Minimum part of a relief's normal along the surface's own normal.
 pub const MIN_UPRIGHT_SHARE: f32 = 0.05;
 /// Part of the way from one level to the next in which both are blended.
 pub const BLENDED_SHARE: f32 = 0.5;

@@ -1,7 +1,7 @@
 //! Powers of many numbers, in steps that compilers turn into few instructions for several at once, and the
 //! values of files for linear light.
 
-/// Least number whose power is computed; smaller ones count as this.
+/// Minimum number whose power is computed; smaller ones count as this.
 const LEAST: f32 = 1e-12;
 
 /// Returns a power of a number of at least 0, within a thousandth. An exponent of at most 200 gives a

@@ -49,8 +49,8 @@ pub struct ObjectPart {
     pub name: String,
     /// Pose in the object's frame, which is that of its first part.
     pub object_from_part: Pose,
-    /// The same with its own joint at the end of its range that is farther from 0; `None` for a part whose
-    /// joint has no range.
+    /// Pose in the object's frame with its own joint at the end of its range that is farther from 0; `None`
+    /// for a part whose joint has no range.
     pub object_from_moved_part: Option<Pose>,
     /// Name in a world of the part that carries this one; `None` if the world does.
     pub carrier: Option<String>,
@@ -96,7 +96,7 @@ impl ObjectModel {
                 object_from_part,
                 object_from_moved_part: farthest(&link.joint).map(|moved| object_from_part * moved),
                 carrier: link.parent.map(|carrier| parts[carrier].name.clone()),
-                // Where the file is placed is not known here.
+                // The place of the file is not known here.
                 model: match link.parent {
                     Some(_) => ObjectModel::of(link),
                     None => ObjectModel { opening: None, ..ObjectModel::of(link) },

@@ -289,7 +289,7 @@ fn a_draft_finds_the_joints_of_a_robot() {
     }
 }
 
-/// Returns the reason for which a robot does not stand for a second; `None` if it does.
+/// Returns the reason why a robot does not stand for a second; `None` if it does.
 #[track_caller]
 fn falls(mjcf: &str) -> Option<String> {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,4 +1,4 @@
-//! From JSON Schema to Python's types, and to the expressions that read them.
+//! Conversion of JSON Schema to Python's types, and to the expressions that parse them.
 
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use super::Table;
 
-/// Largest number of rows on one page; longer tables are broken across pages.
+/// Maximum number of rows on one page; longer tables are broken across pages.
 const MAX_PAGE_ROWS: usize = 40;
 /// Length from which a column's texts are broken into lines, in characters.
 const LONG_TEXT_CHARS: usize = 36;

@@ -9,9 +9,9 @@ use crate::scoring::Facts;
 
 const ACCELERATION_M_S2: f32 = 0.4;
 const AT_END_M: f32 = 1e-4;
-/// Least speed along a path.
+/// Minimum speed along a path.
 const CREEP_M_S: f32 = 0.02;
-/// Largest commanded speed of a robot's base, corrections included.
+/// Maximum commanded speed of a robot's base, corrections included.
 const MAX_SPEED_M_S: f32 = 0.35;
 
 /// Place of one robot and its hands, world frame.

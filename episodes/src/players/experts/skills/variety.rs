@@ -5,12 +5,12 @@ use tandem_sim::{SplitMix64, Vector};
 
 /// Range of the relative change of a motion's duration at level 1.
 const PACE: [f32; 2] = [-0.08, 0.2];
-/// Largest relative reduction of the walking pace at level 1.
+/// Maximum relative reduction of the walking pace at level 1.
 const SLOWER: f32 = 0.12;
 /// Probability of a pause before a motion at level 1, and the range of its duration.
 const PAUSES: f32 = 0.12;
 const PAUSE_S: [f32; 2] = [0.1, 0.5];
-/// Largest detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
+/// Maximum detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
 /// absolute limit.
 const STRAY: f32 = 0.08;
 const MAX_STRAY_M: f32 = 0.02;

@@ -15,7 +15,7 @@ const CLOSE: Tolerance = Tolerance { off_m: 0.02, off_rad: 0.04 };
 /// Tolerance within which a standing robot does not have to walk again.
 const AT_REST: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.04 };
 const TRIES: u32 = 3;
-/// Longest time of a walk. A robot that has not come to rest by then is close enough, or never will be.
+/// Maximum time of a walk. A robot that has not come to rest by then is close enough, or never will be.
 const LONGEST_S: f32 = 20.0;
 /// Number of commands for feet to come together and swaying to stop.
 const SETTLE_COMMANDS: u32 = 6;
@@ -25,7 +25,7 @@ const TWO_STEPS_COMMANDS: usize = 6;
 const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 /// Time that hands take to reach out.
 const REACH_S: f32 = 1.5;
-/// Longest time of a walk with hands that reach out; they correct the rest.
+/// Maximum time of a walk with hands that reach out; they correct the rest.
 const LONGEST_REACHING_S: f32 = 4.0;
 
 /// Goal of a robot's walk.

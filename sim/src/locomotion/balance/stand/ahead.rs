@@ -20,7 +20,7 @@ const ENDS_1_S: f32 = 5.0;
 const LOWEST_M: f32 = 0.70;
 /// Time after the last command until arms and fingers have come to rest.
 const STILL_S: f32 = 0.5;
-/// Force (N) from which on a moving hand has met something, and (`LEFT_N`) down to which this remains so.
+/// Force (N) above which a moving hand has met something, and (`LEFT_N`) below which it no longer has.
 const MET_N: f32 = 8.0;
 const LEFT_N: f32 = 6.0;
 

@@ -32,7 +32,7 @@ const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
 /// Maximum shift of the pelvis that compensates the position error of the feet after such a stop.
 const MOVED_SHIFT_M: f32 = 0.04;
-/// The same for a robot that holds something with partners.
+/// This maximum for a robot that holds something with partners.
 const HELD_SHIFT_M: f32 = 0.02;
 
 /// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.

@@ -19,9 +19,9 @@ use crate::user_file::MAX_TEXT_BYTES;
 
 /// Maximum `count`.
 const MAX_COPIES: usize = 100_000;
-/// Sections whose elements are copied with what they name.
+/// Sections whose elements are copied if they name a copied element.
 const SECTIONS: [&str; 3] = ["contact", "equality", "actuator"];
-/// Attributes of these elements that name others, by the kind of what they name.
+/// Attributes of these elements that name others, by the kind of the named element.
 const REFERENCES: [(&str, &[&str]); 4] = [
     ("body", &["body", "body1", "body2"]),
     ("joint", &["joint", "joint1", "joint2", "jointinparent"]),
@@ -49,7 +49,7 @@ struct CopiedElement {
 #[derive(Clone)]
 struct CopiedName {
     end: usize,
-    /// Indices of the replicates around what it names, the outermost first.
+    /// Indices of the replicates around the element that it names, the outermost first.
     around: Vec<usize>,
     suffix: String,
 }
@@ -69,7 +69,7 @@ enum TextChange {
 struct CopyPlan<'a, 'i> {
     source: &'a MjcfText,
     root: Node<'a, 'i>,
-    /// In the order of their ends, so that those inside another are before it.
+    /// The ends of attributes are in this order, so that an inner one is before the outer one.
     replicates: Vec<Replicate<'a, 'i>>,
     /// Indices of the replicates, by the numbers of their elements.
     numbers: BTreeMap<usize, usize>,
@@ -389,7 +389,7 @@ fn kind(node: &Node) -> Option<&'static str> {
     }
 }
 
-/// Returns text as it stands in an attribute.
+/// Returns text in the escaped form of an attribute.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;").replace('\'', "&apos;")
 }

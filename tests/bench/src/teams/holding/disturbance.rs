@@ -15,7 +15,7 @@ pub(super) enum ArmDisturbance {
     /// Offset of both shoulders' pitch of every robot, reached within a second, rad. With negative values,
     /// hands press towards the load in front of them.
     Shoulders(f32),
-    /// The same, with the opposite sign for every second robot: all hands move the load in one direction.
+    /// This offset with the opposite sign for every second robot: all hands move the load in one direction.
     OneWay(f32),
     /// Normal noise of this deviation (rad) on arms and waist, drawn anew five times a second.
     Noise(f32),

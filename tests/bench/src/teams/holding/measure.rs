@@ -11,7 +11,7 @@ pub(super) struct HoldResult {
     pub drift_m: f32,
     /// The same distance, from its place [`RESTS_AFTER_S`] after the command.
     pub late_drift_m: f32,
-    /// The same for the point at which the object is held, averaged over each second.
+    /// The same distance of the point at which the object is held, averaged over each second.
     pub load_drift_m: f32,
     /// Time at which the last robot stood for good.
     pub standing_after_s: f32,

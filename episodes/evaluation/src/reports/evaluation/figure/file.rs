@@ -28,7 +28,7 @@ const STYLE: &str = "text { fill: #1d2024; font: 13.5px Helvetica, Arial, sans-s
 const MARGIN_PX: f64 = 16.0;
 const TITLE_PX: f64 = 26.0;
 const LEGEND_LINE_PX: f64 = 20.0;
-/// Largest number of drawings beside each other.
+/// Maximum number of drawings beside each other.
 const MAX_COLUMNS: usize = 3;
 /// Maximum width of a letter in the legend.
 const LETTER_PX: f64 = 8.5;

@@ -24,7 +24,7 @@ const CLOSING_GIVES: usize = 6;
 /// Stiffness against which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
 const STIFFNESS_N_M: f32 = 300.0;
 const MAX_GIVE_M: f32 = 0.01;
-/// Largest distance of a wrist's goal from the wrist.
+/// Maximum distance of a wrist's goal from the wrist.
 const LEASH_M: f32 = 0.03;
 
 /// Closes all hands on their places at once. All grasps have the same hold. Hands that miss try again while

@@ -50,7 +50,7 @@ pub fn hand_over(
     Err(PlayerError::GaveUp(format!("{robot} could not take the {}", taker.object.replace('_', " "))))
 }
 
-/// Opens the hand and takes it away until it holds nothing. A person who controls the hand may take longer.
+/// Opens the hand and withdraws it until it holds nothing. A person who controls the hand may take longer.
 fn let_go(commander: &mut Commander, giver: &CylinderGrasp) -> Result<(), PlayerError> {
     for _ in 0..RELEASES {
         release(commander, giver)?;
