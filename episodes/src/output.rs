@@ -54,8 +54,8 @@ pub fn shell_word(text: &str) -> String {
     }
 }
 
-/// Writes a file atomically: under another name first, then renamed once it is complete and on the disk.
-/// A reader sees the whole file or nothing, even after a power cut. A failed write leaves nothing behind.
+/// Writes a file atomically: under another name first, then renamed once it is complete and on the disk. A
+/// reader sees the whole file or no file, even after a power cut. A failed write removes its temporary file.
 ///
 /// # Errors
 ///

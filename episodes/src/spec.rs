@@ -48,7 +48,7 @@ pub struct EpisodeSpec {
     /// Source of the robots' state. Recordings of builds without this choice used the simulator's own.
     #[serde(default = "before_there_was_a_choice")]
     pub sensing: Sensing,
-    /// Renderer of the robots' images; it affects nothing else.
+    /// Renderer of the robots' images. It has no other effect.
     pub renderer: RendererKind,
     /// Model of the robots' cameras.
     #[serde(default, skip_serializing_if = "CameraModel::is_ideal")]
@@ -173,7 +173,7 @@ impl EpisodeSpec {
         Rules { thinking: own.or(rules.thinking), ..rules }
     }
 
-    /// Returns the spec with another assistance, and with the disclosure and hints that belong to it.
+    /// Returns the spec with another assistance, and with the disclosure and hints of that assistance.
     pub fn assisted(self, assistance: Assistance) -> EpisodeSpec {
         EpisodeSpec { assistance, disclosure: assistance.disclosure(), hints: assistance.hints(), ..self }
     }
@@ -203,8 +203,8 @@ impl EpisodeSpec {
     /// Lists the departures from Tandem's defaults, each as shown after the policy's name. A new setting
     /// must be classified here.
     pub fn peculiarities(&self) -> Vec<String> {
-        // The pattern has no `..`, so the compiler reports every new field. Left out are fields that are
-        // shown elsewhere and fields whose effect no policy could notice.
+        // The pattern has no `..`, so the compiler reports every new field. It leaves out fields that are
+        // shown elsewhere and fields without an effect that a policy could notice.
         let EpisodeSpec {
             task,
             seed: _,

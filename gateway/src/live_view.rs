@@ -14,7 +14,8 @@ use tandem_episodes::{LiveChannel, LiveRecording, LiveViewer};
 /// long command plays at once.
 const MAX_WAITING_MESSAGES: usize = 16_384;
 
-/// Schema of shapes. All messages describe the present, and not only the latest.
+/// Schema of shapes. A client needs all messages of this schema to draw the present scene, and not only the
+/// latest.
 const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
 
 /// Server of the recording that began last, for clients of Foxglove. Clones share it.
@@ -94,7 +95,7 @@ impl FoxgloveServer {
 }
 
 impl LiveViewer for FoxgloveServer {
-    /// Shows a new recording in place of the one before.
+    /// Shows a new recording, which replaces the one before.
     fn begin(&self) -> Box<dyn LiveRecording> {
         let (number, before) = {
             let mut shown = self.shown();

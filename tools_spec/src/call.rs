@@ -33,8 +33,8 @@ pub struct Call {
     /// True for the readings of every physics step, if the tool is `get_robot_state` or `observe`.
     #[serde(skip_serializing_if = "is_false")]
     pub samples: bool,
-    /// True for a short reply, without everything that is as expected. Observations have a field of their own
-    /// for that.
+    /// True for a short reply, without values that are as expected. Observations have a separate field for
+    /// that.
     #[serde(skip_serializing_if = "is_false")]
     pub short: bool,
 }
@@ -244,9 +244,9 @@ pub struct PlanStep {
     pub place: String,
     /// The command.
     pub call: PlannedCall,
-    /// Conditions that have to hold after it.
+    /// Conditions that have to hold after the command.
     pub expects: Expectation,
-    /// True if it ends as soon as they hold.
+    /// True if the command ends as soon as they hold.
     pub until: bool,
     /// True for a short reply, if it is the last executed command.
     pub short: bool,

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::refusal::{Refusal, RefusalClass};
 
-/// A call that does not fit the contract. The text says what would work, because its reader is often a
+/// A call that does not fit the contract. The text says which call would work, because its reader is often a
 /// language model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecError {
@@ -13,7 +13,7 @@ pub enum SpecError {
     UnknownTool {
         /// The requested name.
         name: String,
-        /// Every name that would have worked.
+        /// All valid names.
         have: Vec<&'static str>,
     },
     /// The arguments do not have the tool's fields and types.

@@ -42,7 +42,7 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// True if it is for programs: language models are not offered it.
     const FOR_PROGRAMS: bool = false;
 
-    /// Arguments that work, shown to callers whose own did not.
+    /// Valid arguments, shown to callers after a refusal.
     fn example() -> Self;
 
     /// Returns the robots that the arguments name, each as often as they name it.
@@ -60,8 +60,8 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
         Route::of_episode("{episode_id}", Self::NAME)
     }
 
-    /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text
-    /// says what would work.
+    /// Checks properties that need no world: lengths, finite numbers, quaternions that have a direction. The
+    /// text says which values would work.
     fn validate(&self) -> Result<(), String> {
         Ok(())
     }

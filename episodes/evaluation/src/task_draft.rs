@@ -12,9 +12,9 @@ use tandem_sim::{
 
 /// Length of a trial. It is longer than any fall from a table.
 const TRIAL_STEPS: u32 = 100;
-/// Length of a trial of a robot's place: overlapping bodies separate at once.
+/// Duration of a trial of a robot's place. Overlapping bodies separate within this time.
 const PLACE_STEPS: u32 = 15;
-/// Distance within which something counts as staying in place.
+/// Distance within which an object counts as staying in place.
 const STAYS_M: f32 = 0.03;
 /// Height below which robots stand on the floor.
 const FEET_M: f32 = 0.08;
@@ -63,7 +63,7 @@ struct Listed {
 ///
 /// # Errors
 ///
-/// Returns an error if the scene cannot be read or simulated, or if nothing in it can be moved.
+/// Returns an error if the scene cannot be read or simulated, or if it has no movable object.
 pub fn draft_task(scene: &Path, scene_name: &str, id: &str) -> Result<TaskDraft, TaskDraftError> {
     let document = Arc::new(Document::read(scene)?);
     let bodies = listed(&document)?;
@@ -103,7 +103,7 @@ fn listed(document: &Arc<Document>) -> Result<Vec<Listed>, SimError> {
     for body in document.scene_bodies()? {
         let name = body.link.name.clone();
         let file = ObjectFile::OfScene { scene: document.clone(), body: name.clone() };
-        // A body without a name of its own cannot be asked for.
+        // A body without a name cannot be selected.
         let Ok(parts) = ObjectModel::parts(&file, &name) else { continue };
         let Some(part) = parts.first() else { continue };
         let reach_m = |direction| part.model.reach_m(&body.scene_from_body, direction);
@@ -219,7 +219,7 @@ fn tried(name: &'static str, around_m: Vector) -> impl Iterator<Item = RobotPlac
     })
 }
 
-/// Returns true if the last of these robots stands and touches nothing but the floor.
+/// Returns true if the last of these robots stands and touches only the floor.
 fn stands(
     document: &Arc<Document>,
     model: &Arc<RobotModel>,

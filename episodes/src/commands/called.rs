@@ -314,7 +314,7 @@ impl OperatorCall {
 }
 
 impl OperatorCommand {
-    /// Sets what its operator has used up to now.
+    /// Sets the amounts that its operator has used up to now.
     pub fn with_use(self, used: OperatorUse) -> OperatorCommand {
         OperatorCommand { used: Some(used), ..self }
     }

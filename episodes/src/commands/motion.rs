@@ -27,7 +27,7 @@ const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
-/// Length in metres that counts as much as a radian in the distance to a wrist's target.
+/// Length in metres that counts like a radian in the distance to a wrist's target.
 const M_PER_RAD: f64 = 0.1;
 /// Weight of one control step in the running mean of the distance.
 const LATELY_PART: f64 = 0.1;
@@ -44,7 +44,7 @@ pub struct RobotSheet {
     pub model: Arc<RobotModel>,
     /// Limits of the base commands that its controller follows.
     pub base_limits: BaseLimits,
-    /// Pose of the room frame, the first robot's start frame, in its own start frame.
+    /// Pose of the room frame in the first robot's start frame.
     pub start_from_room: Isometry3<f64>,
 }
 
@@ -56,7 +56,7 @@ pub struct Motion {
     state: MotionState,
 }
 
-/// State of a motion: everything that persists between control steps.
+/// State of a motion that persists between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MotionState {
     /// Joint targets of the current control step, in action order.
@@ -306,7 +306,7 @@ impl Motion {
         })
     }
 
-    /// Begins a command with a report of its own.
+    /// Begins a command that has a separate report.
     pub fn begin_command(&mut self) {
         self.state.footing.begin();
     }
@@ -348,12 +348,12 @@ impl Motion {
         !self.state.setpoints.is_empty()
     }
 
-    /// Hands a robot whose motors are driven back to its controller, in the posture in which it is.
+    /// Returns a robot with driven motors to its controller, in its present posture.
     pub(super) fn hand_back(&mut self) {
         self.state.setpoints.clear();
     }
 
-    /// Sets the targets under which the robot would stay as it is.
+    /// Sets the targets that keep the robot in its present posture and place.
     fn stay_where(&mut self, sensed: &RobotSensed) {
         let joint_rad = |column: usize| {
             let joint = &self.robot.model.joints[UPPER[column]];
@@ -443,7 +443,8 @@ impl Motion {
         self.body.tolerance(side)
     }
 
-    /// Predicts the rest poses for `targets` (pelvis frame); an arm without a target keeps its joints.
+    /// Predicts the rest poses for `targets` (pelvis frame). The joints of an arm without a target do not
+    /// move.
     pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
         let speeds_rad_s = self.body.speeds_rad_s(targets, keeps_waist);
         let tasks = self.body.tasks(targets, 1.0);

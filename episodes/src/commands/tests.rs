@@ -143,8 +143,8 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
-/// A hand with a new orientation and no position is to stay at its earlier target. Pulled continually, it
-/// yields by no more than the limit of one command.
+/// A hand with a new orientation and no position is to stay at its earlier target. A continual pull moves it
+/// by no more than the limit of one command.
 #[test]
 fn targets_that_are_left_out_do_not_go_on_from_where_hands_have_given_way_to() {
     let mut motion = arrived();

@@ -1,4 +1,4 @@
-//! A whole recording in memory, every byte of which has been checked.
+//! A whole recording in memory with all checksums verified.
 //!
 //! | bytes | checked against |
 //! |---|---|

@@ -247,7 +247,7 @@ impl<'a> DataSection<'a> {
         Ok(AttachmentPlace { log_time, create_time, name, media_type, data })
     }
 
-    /// Compares a message index with the chunk before it, about which it has no further information.
+    /// Compares a message index with the chunk before it. An index has no further information.
     fn compare_index(&mut self, content: &[u8]) -> Result<(), Fault> {
         let Record::MessageIndex(index) = parse(op::MESSAGE_INDEX, content)? else {
             return Err(Fault::Unexpected);

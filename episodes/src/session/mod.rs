@@ -1,5 +1,5 @@
-//! Sessions: an episode's world, its rules, and the tool calls that act on it. A session is synchronous
-//! and lives on a thread of its own.
+//! Sessions: an episode's world, its rules, and the tool calls that act on it. A session is synchronous and
+//! runs on its own thread.
 
 mod answer;
 mod build;
@@ -345,8 +345,8 @@ impl Session {
         }
     }
 
-    /// Returns what a recording keeps of a step beside the commands: executed commands only if they may
-    /// differ from these.
+    /// Returns the recorded data of a step besides the commands. Executed commands are included only if they
+    /// may differ from the policy's.
     fn recorded(&self, executed: &Executed) -> Executed {
         match self.execution {
             Some(_) => executed.clone(),

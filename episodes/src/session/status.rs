@@ -143,7 +143,8 @@ impl Session {
         }
     }
 
-    /// Returns the full result, whatever the policy may know of it. After the end it is final.
+    /// Returns the full result, including what the assistance hides from the policy. The result is final
+    /// after the end.
     pub fn result(&self) -> ResultReply {
         match &self.result {
             Some(result) => result.clone(),

@@ -1,5 +1,5 @@
-//! Execution of commands that differs from the policy's: late commands, a failing partner, and slow noise,
-//! if an episode asks for any of these.
+//! Execution of commands that differ from the policy's: late commands, a failing partner, and slow noise, if
+//! an episode has any of these.
 
 use std::collections::VecDeque;
 

@@ -318,7 +318,7 @@ fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
     assert_eq!(told(compliance), ["wrist commands: compliance"]);
 }
 
-/// Degrees in place of radians are the usual mistake.
+/// Degrees instead of radians are the usual mistake.
 #[test]
 fn joint_targets_beyond_their_limits_are_counted() {
     let told = |arm: f64| {

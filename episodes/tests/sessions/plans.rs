@@ -233,7 +233,7 @@ fn commands_of_a_plan_may_ask_for_short_replies() {
     assert!(refused.contains("command 1 of ") && refused.contains("short"), "{refused}");
 }
 
-/// Two robots stand; one of them has nothing to report.
+/// Two robots stand. The report on one of them is empty.
 #[test]
 fn a_robot_that_did_nothing_is_not_told_of() {
     let mut session = agentic();

@@ -13,7 +13,7 @@ use crate::client::PolicyClient;
 /// another 20 s.
 const LONGEST_SILENCE: Duration = Duration::from_secs(5);
 
-/// A client whose connection stays alive for as long as this is held, even while it is idle.
+/// A client whose connection stays open while this value exists, even if it is idle.
 pub struct KeptClient {
     shared: Arc<SharedClient>,
     keeper: Option<JoinHandle<()>>,

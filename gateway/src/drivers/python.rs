@@ -140,7 +140,7 @@ impl PythonModule {
         }))
     }
 
-    /// Returns the command for it, with `further` arguments before its own.
+    /// Returns the command of the interpreter, with `further` arguments before the command's own.
     pub fn command(&self, further: &[&str]) -> Command {
         let mut command = Command::new(&self.python);
         command.args(["-m", self.part.module()]).args(further).args(&self.arguments);

@@ -17,7 +17,7 @@ pub struct ImageLinks(Mutex<VecDeque<LinkedImage>>);
 /// A linked image.
 #[derive(Debug, Clone)]
 pub struct LinkedImage {
-    /// The robot whose camera took it.
+    /// The robot whose camera took the image.
     pub robot: String,
     /// The PNG file.
     pub png: Arc<[u8]>,
@@ -86,7 +86,7 @@ mod tests {
         assert!(first.images.is_empty());
         let found = links.find("300-B.png").unwrap();
         assert_eq!((found.robot.as_str(), &*found.png), ("B", &b"B"[..]));
-        // Looking again at the same step drops nothing.
+        // A second observation of the same step drops no image.
         (0..MAX_LINKED_IMAGES).for_each(|_| links.link("x", 300, &mut seen(&["A"])));
         assert!(links.find("300-B.png").is_some());
         (1..MAX_LINKED_IMAGES as u32).for_each(|step| links.link("x", 300 + step, &mut seen(&["A"])));

@@ -117,7 +117,7 @@ impl EpisodeTable {
         matches!(self.purpose, Purpose::Evaluation)
     }
 
-    /// Returns true if clients start episodes here and may come back to them.
+    /// Returns true if clients start episodes here and may return to them.
     pub fn serves_clients(&self) -> bool {
         matches!(self.purpose, Purpose::Clients)
     }
@@ -266,8 +266,8 @@ impl EpisodeTable {
         Surroundings { folder, place, metrics: self.metrics.clone(), memory, journals }
     }
 
-    /// Returns the reply to `list_tasks`, with this server's limit on thinking time and without what is
-    /// hidden from its policies.
+    /// Returns the reply to `list_tasks`, with this server's limit on thinking time and without information
+    /// that is hidden from its policies.
     pub fn task_list(&self) -> TaskList {
         let Settings { tasks, stress, base_limits, instructions, .. } = &*self.settings;
         let mut list = instructions.task_list(tasks, *stress, base_limits);

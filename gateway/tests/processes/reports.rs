@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::skipped::skipped;
 
-/// Runs `tandem` in `folder`, where it succeeds, and returns what it printed.
+/// Runs `tandem` in `folder`, checks that it succeeds, and returns its output.
 #[track_caller]
 fn tandem(folder: &Path, arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));

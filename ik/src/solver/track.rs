@@ -16,7 +16,7 @@ use crate::qp::QpFailure;
 use crate::tasks::{ERROR_CLAMP, Task};
 
 const MAX_HALVINGS: usize = 5;
-/// Damping per joint that caution multiplies, 1/rad or 1/m.
+/// Damping per joint at a caution of 1, 1/rad or 1/m.
 const CAUTION: f64 = 1e-2;
 const MAX_CAUTION: f64 = 1e3;
 /// Relative growth of an objective that counts as rounding.

@@ -12,7 +12,7 @@ use crate::estimate::JointReadings;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
 
-/// Values that a robot senses, in frames of its own. A reply or a policy may use only these and
+/// Values that a robot senses, in its own frames. A reply or a policy may use only these and
 /// [`RobotTruth::fallen`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
@@ -73,7 +73,7 @@ impl RobotTruth {
 }
 
 impl Robot {
-    /// Returns the sensed values and the poses derived from them.
+    /// Returns the sensed values and the poses derived from these values.
     pub(crate) fn sensed(&self) -> RobotSensed {
         let body = &self.body;
         let world_from_pelvis = body.world_from_pelvis();
@@ -138,7 +138,7 @@ impl Robot {
         RobotCommand { upper_rad, base: self.memory.base }
     }
 
-    /// Returns the command under which the robot stays as it is, by its encoders and its estimate of its
+    /// Returns the command that keeps the robot in its present state, by its encoders and its estimate of its
     /// pelvis.
     pub(crate) fn rest_command(&self) -> RobotCommand {
         let base = BaseCommand::standing(self.body.world_from_pelvis().translation.z);

@@ -29,7 +29,7 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     }
 }
 
-/// Returns a floor, and something that moves.
+/// Returns a floor and a moving object.
 fn floor_and(mesh: TriangleMesh) -> Scenery {
     let mut scenery = scenery(vec![floor(), (mesh, Pose::IDENTITY)]);
     scenery.parts[1].carrier = Carrier::Object(0);
@@ -199,7 +199,7 @@ fn ids_name_the_nearest_thing() {
 
 #[test]
 fn neighbouring_triangles_leave_no_gap() {
-    // Within the image of a closed shape nothing of the floor behind it may show, whichever way it is turned.
+    // Within the image of a closed shape no part of the floor behind it may show, from any direction.
     for step in 0..24 {
         let rotation =
             Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);

@@ -125,12 +125,12 @@ fn outline(schema: &Value) -> Value {
     json!({ "type": "object", "properties": properties, "required": schema["required"] })
 }
 
-/// Required fields whose names say what they are.
+/// Required fields with self-explanatory names.
 const PLAIN_NAMES: [&str; 3] = ["episode_id", "robot", "robots"];
-/// Fields whose names say what they are, beside those of the left hand and in the pelvis frame.
+/// Fields with self-explanatory names, beside those of the left hand and in the pelvis frame.
 const PLAIN_EVERYWHERE: [&str; 4] = ["right_position_m", "right_quaternion_wxyz", "vx_m_s", "yaw_rate_rad_s"];
 
-/// Drops what names already say and what the server checks itself: defaults, and the exclusion of other
+/// Drops parts that names already express or that the server checks: defaults, and the exclusion of other
 /// fields.
 fn slim(schema: &mut Value) {
     match schema {

@@ -66,7 +66,7 @@ pub struct EpisodeToolSpec {
     pub read_only: bool,
     /// Its REST route.
     pub route: Route,
-    /// JSON Schema of the body without what a refusal says when it matters.
+    /// JSON Schema of the body without texts that refusals contain.
     pub body_schema: Value,
 }
 
@@ -119,7 +119,8 @@ impl ToolSpec {
         self.marked_body["anyOf"] = conditions;
     }
 
-    /// Returns the schema of a plan's command that names this tool. Its steps may be more with `until`.
+    /// Returns the schema of a plan's command that names this tool. A command with `until` may have more
+    /// steps.
     pub(crate) fn as_planned(&self) -> Value {
         let mut arguments = self.marked_body.clone();
         arguments.as_object_mut().and_then(|arguments| arguments.shift_remove("$schema"));

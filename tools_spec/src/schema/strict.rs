@@ -122,9 +122,9 @@ pub fn unwrap_lines(object: &mut Map<String, Value>) {
     }
 }
 
-/// Replaces `oneOf`, which strict hosts refuse and which is how schemars writes an enum whose variants are
-/// described: the names become an `enum` and their descriptions part of the enum's own. Of any other
-/// `oneOf` only the texts are left.
+/// Replaces `oneOf`, which strict hosts refuse and which schemars writes for an enum with described variants.
+/// The names become an `enum`, and their descriptions part of the enum's description. Of any other `oneOf`
+/// only the texts remain.
 pub fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;

@@ -49,7 +49,7 @@ impl TypedToolsCollector {
         self.tools.push(TypedTool { name: T::NAME, arguments, reply, on_episode, for_operators });
     }
 
-    /// Adds a type that stands within a reply and has a name of its own all the same.
+    /// Adds a type inside a reply that nevertheless has its own name.
     pub fn add_type<T: JsonSchema>(&mut self) {
         self.generator.subschema_for::<T>();
     }

@@ -36,9 +36,9 @@ impl Threads {
         Threads { helpers: (1..threads).filter_map(helper).collect() }
     }
 
-    /// Runs jobs and returns their results. A thread begins with the jobs that it also had in the last
-    /// round, whose data are in its caches. When it is done it takes over jobs of other threads, because
-    /// worlds differ in the cost of a step.
+    /// Runs jobs and returns their results. A thread begins with the jobs that it had in the last round,
+    /// because their data are in its caches. It then takes over jobs of other threads, because worlds differ
+    /// in the cost of a step.
     pub fn map<R: Send + 'static>(
         &self,
         jobs: usize,

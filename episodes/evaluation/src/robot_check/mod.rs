@@ -15,7 +15,7 @@ use stand::stand;
 pub struct RobotCheck {
     /// Parts that it lacks, with the consequences.
     pub lacks: Vec<String>,
-    /// Reason why it does not stand for a second; `None` if it does.
+    /// Reason why the robot does not stand for a second; `None` if it does.
     pub falls: Option<String>,
 }
 

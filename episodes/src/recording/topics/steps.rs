@@ -277,7 +277,7 @@ mod tests {
         assert_eq!([0, 1, 1u32.wrapping_neg()].map(zigzag), [0, 2, 1]);
     }
 
-    /// Returns steps of a world at rest, with varied numbers and varied counts of them.
+    /// Returns steps of a world at rest. Their numbers and their counts of numbers vary.
     fn steps() -> Vec<Step> {
         let spec = crate::EpisodeSpec::new(
             &crate::tasks::find("pouring").unwrap(),

@@ -1,12 +1,11 @@
 //! `walk_to` for robots that push or carry: bases and hands follow one path from rest to rest, each
 //! robot's in its own start frame.
 //!
-//! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid
-//! body. Robots that hold one load, with places that fit it, thus move as one body with it, without
-//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place,
-//! which are those of the first step. So an error of the base does not carry over to the next leg.
-//! Robots walk half a second behind their commands, so base commands are ahead of the planned places by
-//! that time.
+//! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid body.
+//! Robots that hold one load, with places that fit it, thus move as one body with the load. They need no
+//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place, which
+//! are those of the first step. So an error of the base does not carry over to the next leg. Robots walk half
+//! a second behind their commands, so base commands are ahead of the planned places by that time.
 
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};

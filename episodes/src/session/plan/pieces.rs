@@ -8,7 +8,7 @@ use crate::EpisodeError;
 use crate::commands::{self, Command, columns, wrist_targets};
 use crate::session::Session;
 
-/// Control steps of a piece, after each of which the conditions are checked.
+/// Number of control steps of a piece. The conditions are checked after each piece.
 const PIECE_STEPS: u32 = 5;
 /// Additional control steps in which wrists reach the ends of their paths.
 const ARRIVING_STEPS: u32 = 25;

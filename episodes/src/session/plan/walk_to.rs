@@ -42,7 +42,7 @@ const PULSE_M: f64 = 0.35;
 const PULSE_RAD: f64 = 0.5;
 /// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
-/// Minimum approach within this many walks; with less, the robot is blocked.
+/// Minimum decrease of the distance within this number of walks. A robot with a smaller one is blocked.
 const NEARER_M: f64 = 0.03;
 const PATIENCE_WALKS: u32 = 12;
 

@@ -50,7 +50,7 @@ impl Walkers {
         }
     }
 
-    /// Ends the walk before its places. Robots that carry come to rest first, and their hands with them.
+    /// Ends the walk before its places. Robots that carry a load come to rest first, and so do their hands.
     pub fn end(&mut self, session: &Session, last: Option<&CommandReply>, why: String) -> PlanAdvance {
         match &mut self.way {
             WalkersWay::Free(_) => PlanAdvance::Done(Some(why)),

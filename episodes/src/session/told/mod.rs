@@ -35,20 +35,20 @@ impl ShownInformation {
         self.0.iter().map(|(what, robots)| (what.name().into(), robots.clone())).collect()
     }
 
-    /// Counts an observation that has shown all of `shown` for every robot in it.
+    /// Counts an observation that has shown everything in `shown` for each of its robots.
     pub fn count_each(&mut self, shown: &[ExtraInformation], seen: &TeamObservation) {
         for robot in &seen.robots {
             shown.iter().for_each(|what| self.count(*what, &robot.state.robot));
         }
     }
 
-    /// Counts a reply that has shown `what` of `robot`.
+    /// Counts a reply that has shown the information `what` about `robot`.
     fn count(&mut self, what: ExtraInformation, robot: &str) {
         *self.0.entry(what).or_default().entry(robot.into()).or_default() += 1;
     }
 
-    /// Counts the information in an answer from which everything withheld has been removed. An
-    /// observation is in the formats of its call.
+    /// Counts the information in an answer from which withheld data have been removed. An observation is in
+    /// the formats of its call.
     pub fn count_answer(&mut self, answer: &Answer, formats: &Formats, protocol: Protocol) {
         match answer {
             Answer::Observation(seen) => self.count_seen(seen, formats),

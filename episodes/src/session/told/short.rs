@@ -1,4 +1,4 @@
-//! Short replies for language models. They leave out everything that is as expected.
+//! Short replies for language models. They leave out all values that are as expected.
 
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{
@@ -114,7 +114,7 @@ fn shorten_report(reply: &mut CommandReply, executed_steps: u32, tells_pelvises:
     reply.phases.retain(|phase| phase.time_s > began_s);
     shorten_budget(&mut reply.budget);
     reply.robots.iter_mut().for_each(|report| shorten_robot(report, tells_pelvises));
-    // A robot with nothing to report has not moved.
+    // A robot without an entry in the report has not moved.
     reply.robots.retain(|report| *report != still(report));
 }
 
@@ -132,7 +132,7 @@ fn shorten_robot(report: &mut RobotReport, tells_pelvises: bool) {
     shorten_hand(right);
 }
 
-/// Returns the report on the same robot with hands that have no target and feel nothing.
+/// Returns the report on the same robot with hands that have no target and feel no contact.
 fn still(report: &RobotReport) -> RobotReport {
     let RobotReport { robot, frame, .. } = report;
     let hand = HandReport { state: Some(HandState::Idle), ..HandReport::default() };

@@ -17,7 +17,7 @@ const EXAMPLE: &str =
 /// Maximum duration that a phase may require.
 const LONGEST_S: f64 = 3600.0;
 
-/// Returns the phases with their conditions. Terms are read first; each may refer to those above it.
+/// Returns the phases with their conditions. Terms are read first. A term may refer to earlier terms.
 pub(super) fn phases(
     reading: &mut Reading,
     terms: BTreeMap<Spanned<String>, Spanned<String>>,

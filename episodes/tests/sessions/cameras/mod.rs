@@ -1,4 +1,4 @@
-//! Episodes seen through a D435i: everything that shows images or depth shows the camera's.
+//! Tests of episodes with a D435i: all images and depths are the camera's.
 
 use std::collections::BTreeMap;
 

@@ -53,7 +53,7 @@ fn surfaces(session: &mut Session, query: Value) -> DepthReply {
     }
 }
 
-/// A pixel on a bottle on the counter yields the whole bottle, nothing else, and its axis.
+/// A pixel on a bottle on the counter yields the whole bottle, without other objects, and its axis.
 #[test]
 fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     let mut session = start("handover", 2011, Protocol::Agentic);

@@ -38,7 +38,7 @@ const LOOPBACK: [&str; 2] = ["127.0.0.1", "localhost"];
 /// Variables that make clients ask a proxy. Many programs read them in lower case, too.
 const PROXIES: [&str; 3] = ["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"];
 
-/// Checks everything around the program. Episodes run without it, except for a correct date and free space.
+/// Checks the environment of the program. Episodes run without it, except for a correct date and free space.
 pub fn check(layer: &Layer) -> Findings {
     vec![
         (RendererKind::Gpu.name(), gpu(layer.renderer())),

@@ -72,7 +72,7 @@ impl Program {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
-            // The program could read files, so nothing is written within its reach while it runs.
+            // The program could read files, so no file is written within its reach while it runs.
             record: Some(Record::After),
             ..Layer::default()
         };
@@ -298,7 +298,8 @@ impl Policy for Program {
     }
 }
 
-/// Creates the folder of an episode. Refuses a link, whose creator would choose which files are written.
+/// Creates the folder of an episode. Refuses a link, because its creator would choose the files that are
+/// written.
 fn create_own_folder(folder: &Path) -> io::Result<()> {
     let is_link = fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
     if is_link {
@@ -324,11 +325,11 @@ struct FoundProgram {
     env_steps: u32,
     /// Exit status as text.
     status: String,
-    /// Reason why its last refused call was refused, if it has failed.
+    /// Reason of the program's last refusal, if it has failed.
     refusal: Option<String>,
 }
 
-/// State of a program at the end of the wait, as far as its end is concerned.
+/// State of a program's process at the end of the wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
     /// The program ended after its episode, or had completed its part and did not cause the end.
@@ -352,7 +353,7 @@ impl ProgramExit {
     }
 }
 
-/// Returns the last lines that a program has written to stderr, or else to stdout, as far as they fit.
+/// Returns as many of the last lines as fit that a program has written to stderr, or else to stdout.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
         let path = folder.join(name);

@@ -32,7 +32,7 @@ pub struct Desk {
     stage: Arc<Stage>,
     session: PanicGuard,
     log: Option<Log>,
-    /// True once the episode is to sleep.
+    /// True once the episode is to be suspended.
     sleeps: bool,
     closing: Option<Closing>,
 }
@@ -99,7 +99,7 @@ impl Desk {
         done
     }
 
-    /// Lets the episode sleep after the jobs that have arrived by now, if it can be brought back.
+    /// Suspends the episode after the jobs that are in the queue now, if it can be brought back.
     pub fn sleep(&mut self) -> Outcome<()> {
         if self.log.is_some() {
             let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
@@ -188,7 +188,7 @@ impl Desk {
         });
         match begun {
             Ok(log) => {
-                // After a panic there is nothing to keep.
+                // After a panic there is no state to keep.
                 let _ = self.session.run(Session::keep_journal);
                 self.log = Some(log);
                 self.stage.status.durable.store(true, Relaxed);

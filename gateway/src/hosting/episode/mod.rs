@@ -55,7 +55,7 @@ pub struct EpisodeThread {
 }
 
 impl EpisodeThread {
-    /// Creates the world on a thread of its own, runs the initial hold and returns the policy's briefing.
+    /// Creates the world on a separate thread, runs the initial hold and returns the policy's briefing.
     pub async fn start(
         id: &str,
         spec: EpisodeSpec,
@@ -118,7 +118,7 @@ impl EpisodeThread {
         }
     }
 
-    /// Puts the episode to sleep if it can be brought back and nobody would notice.
+    /// Suspends the episode if it can be brought back and nobody would notice.
     pub fn put_aside(&self) {
         if self.may_sleep() {
             self.queue.send_if_idle(job(Desk::sleep).0);

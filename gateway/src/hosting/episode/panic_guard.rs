@@ -1,5 +1,4 @@
-//! The panic guard: a session that a panic ends without affecting anything else. Its work is counted in
-//! the metrics.
+//! The panic guard: a session in which a panic ends only this episode. Its work is counted in the metrics.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,8 +19,8 @@ pub struct PanicGuard {
 
 enum GuardState {
     Sound(Box<Session>),
-    /// After a panic the state of the world is undefined and no longer used. The result covers what could
-    /// be closed.
+    /// After a panic the state of the world is undefined and no longer used. The result covers the files that
+    /// could be closed.
     Panicked(Option<Box<ResultReply>>),
 }
 

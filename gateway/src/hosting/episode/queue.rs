@@ -86,7 +86,7 @@ impl JobQueue {
     pub fn send_if_idle(&self, job: Job) {
         let jobs = self.lock();
         if jobs.capacity() == jobs.max_capacity() {
-            // An episode that has stopped meanwhile needs nothing any more.
+            // An episode that has stopped meanwhile has no more work.
             let _ = jobs.try_send(job);
         }
     }

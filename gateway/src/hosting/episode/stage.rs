@@ -35,7 +35,7 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// Restores the memory of another process, and the answers and notes that may be requested again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
-    /// Drops what [`HostMemory::restore`] brings back, because the episode is put to sleep.
+    /// Drops the data that [`HostMemory::restore`] brings back, because the episode is suspended.
     fn let_go(&self);
 
     /// Returns true if a player in this process would miss the episode.

@@ -30,7 +30,7 @@ pub struct SharedStatus {
     /// True if the episode can be brought back, and so put to sleep.
     pub durable: AtomicBool,
     sleep: Mutex<Option<Sleep>>,
-    /// True once everything from before the sleep is restored. The episode is woken up before that.
+    /// True once the state from before the suspension is restored. The episode is woken up before that.
     there: AtomicBool,
     /// Time of the last request.
     used: Mutex<Instant>,

@@ -23,7 +23,7 @@ impl OperatorClock {
         self.since.get_or_insert_with(|| Instant::now() + pace);
     }
 
-    /// Sets the time after a command that counts as pacing: a control step in real time, else none.
+    /// Sets the time after a command that counts as pacing: a control step in real time, and otherwise 0.
     pub fn set_pace(&mut self, pace: Duration) {
         self.pace = pace;
     }

@@ -204,8 +204,8 @@ impl OperatorHandle {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Lets the operator leave. The episode ends when nobody is left; until then its robot holds still,
-    /// and the answer is the episode's status.
+    /// Lets the operator leave. The episode ends when the last operator has left. Until then its robot holds
+    /// still, and the answer is the episode's status.
     async fn finish(&self, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
         let others_play_on = !self.episode.ended() && self.round().finish(self.seat)?;
         let call: ToolCall = match others_play_on {
@@ -222,8 +222,8 @@ impl OperatorHandle {
         self.ask(call.into(), keyed, then).await
     }
 
-    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if it had
-    /// finished; the episode ends when nobody else plays.
+    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if the
+    /// operator had finished. The episode ends when no operator plays.
     fn check_clock(&self) -> Result<(), HostingError> {
         let limit = self.team.rules.thinking_limit;
         let Some(limit) = limit.filter(|limit| self.own(|own| own.thought()) >= *limit) else {

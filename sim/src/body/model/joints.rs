@@ -69,9 +69,9 @@ fn check_legs(found: &[JointModel], names: &[String]) -> Result<(), String> {
     Err(format!("needs {joints} {}; {have}", lacking.join(", ")))
 }
 
-/// Returns the link that carries a joint of the published order; `joints` are those before it.
+/// Returns the link that carries a joint of the published order; `joints` are the earlier joints.
 fn carrier(joints: &[JointModel], index: usize) -> usize {
-    // The last of a group in the tree, whatever the order of its joints.
+    // The last joint of a group in the tree, for any order of its joints.
     let end = |first: usize, count: usize| {
         joints[first..first + count].iter().map(|joint| joint.link).max().unwrap_or_default()
     };

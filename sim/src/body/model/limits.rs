@@ -40,7 +40,7 @@ pub(super) fn limits_of_file(document: &Document) -> Result<BTreeMap<String, Fil
     Ok(found)
 }
 
-/// Returns the range of an actuator's efforts. That of a motor without a range of its own is the range of its
+/// Returns the range of an actuator's efforts. For a motor without such a range it is the range of its
 /// commands.
 fn effort_range_n_m(actuator: &Actuator) -> Option<[f64; 2]> {
     let commanded = || {
@@ -71,7 +71,7 @@ pub(super) struct JointSources<'a> {
     /// Name of the description in messages.
     pub file: &'a str,
     pub description: &'a RobotDescription,
-    /// Robot that supplies limits that nothing else gives.
+    /// Robot that supplies missing limits.
     pub like: Option<&'a RobotModel>,
     pub g1: &'a RobotModel,
 }

@@ -52,7 +52,7 @@ impl Mask {
 /// A collider at its pose in this step.
 pub struct Surface {
     pub collider: Collider,
-    /// The link that carries it; `None` if nothing moves that link.
+    /// The link that carries the collider; `None` if that link cannot move.
     pub body: Option<LinkId>,
     /// True if the shape rolls on features that Parry treats as edges and corners. Balls are not round
     /// in this sense: Parry finds their point of contact exactly.
@@ -130,7 +130,7 @@ impl Surface {
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
     }
 
-    /// Returns true if nothing moves the surface, or its body sleeps.
+    /// Returns true if the surface cannot move, or its body sleeps.
     pub fn is_still(&self, trees: &Trees) -> bool {
         self.body.is_none_or(|link| trees.all[link.tree.index()].is_asleep())
     }

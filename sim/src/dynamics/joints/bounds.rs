@@ -17,7 +17,7 @@ pub struct JointRows {
     all: Vec<JointRow>,
     /// Range of rows of each lot of similar trees.
     of_alike: Vec<Range<usize>>,
-    /// Columns within a tree, and Y in them, of all rows.
+    /// Columns within a tree and entries of Y there, for all rows.
     column: Vec<u16>,
     y: Vec<Abreast>,
     drives: Vec<BoundedDrive>,

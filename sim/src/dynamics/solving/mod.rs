@@ -36,7 +36,7 @@ const DEEP_M: f64 = 0.01;
 const RIGID_M: f64 = 0.02;
 /// Lower bound of the inverse mass of a contact's normal, as a share of the links' own inverse masses.
 const MIN_SHARE: f64 = 0.01;
-/// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
+/// Energy (J) removed by the relaxing sweeps above which more energy may be left.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
@@ -295,9 +295,9 @@ fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
-/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses
-/// a finger that is stretched against its stop with 300 times its weight into something. Without this,
-/// the finger would stay 2 cm deep.
+/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses a
+/// finger that is stretched against its stop into an obstacle, with 300 times the finger's weight. Without
+/// this, the finger would stay 2 cm deep.
 fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }

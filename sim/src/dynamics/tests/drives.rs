@@ -86,8 +86,8 @@ fn saturated_chain(height_m: f64, armature: f64, steps: usize) -> (usize, usize)
     (limited, checked)
 }
 
-/// Checks that the reported efforts match inverse dynamics. Returns false if something touches or the
-/// tree is fast, where no comparison is possible.
+/// Checks that the reported efforts match inverse dynamics. Returns false if bodies touch or the tree is
+/// fast, where no comparison is possible.
 fn check_efforts(
     bench: &Bench,
     id: super::super::TreeId,
@@ -113,7 +113,7 @@ fn check_efforts(
     true
 }
 
-/// A drive holds a load against gravity with the limit just above it, and yields just below.
+/// A drive holds a load against gravity if its limit is just above the load, and yields if it is just below.
 #[test]
 fn dynamics_drive_gives_way_beyond_its_limit() {
     let mut mass = Mass::of_box(2.0, DVec3::splat(0.05));

@@ -53,7 +53,7 @@ const FARTHER_ASIDE_M: f32 = 0.025;
 /// joint friction.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
-/// Zone of the centre of mass of a robot that holds something with partners: smaller, because the feet
+/// Zone of the centre of mass of a robot that holds an object with partners. It is smaller, because the feet
 /// have to hold the partners' pull.
 const HELD_ZONE_M: f32 = 0.028;
 /// Yielding to partners. Beyond this pull of a shared load on its hands, a robot moves along the pull.

@@ -29,7 +29,7 @@ const DAMPING_1_S: f32 = 35.0;
 pub(super) struct Swing {
     from: Pose,
     to: Pose,
-    /// The path along the ground; the lift is added to it.
+    /// The path along the ground, without the lift.
     position_m: Vector,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,

@@ -10,7 +10,8 @@ use super::texture::{TexelMeaning, Texture};
 use crate::SimError;
 use crate::mjcf::Document;
 
-/// Roles whose texture gives a material's images their places, the first that there is.
+/// Roles of textures that determine the places of a material's images. The first role that the material has
+/// counts.
 const PLACING: [&str; 9] =
     ["rgb", "rgba", "orm", "roughness", "metallic", "normal", "opacity", "emissive", "occlusion"];
 

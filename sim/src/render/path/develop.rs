@@ -42,7 +42,7 @@ impl Negative<'_> {
     /// Returns the linear colour of a surface in a pixel, in the light of the pixel about it that shows it
     /// best.
     fn seen_rgb(&self, row: usize, column: usize, seen: &SeenSurface) -> Vector {
-        // Any light is better than none.
+        // Even little light gives a better image than no light.
         let rank = |there: usize| match &self.guides[there] {
             SeenSurface { id: 0, .. } => -1.0,
             guide => seen.likeness(guide),

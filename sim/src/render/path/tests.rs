@@ -99,7 +99,7 @@ fn red_wall() -> (Scenery, Camera) {
 fn a_red_wall_colours_the_floor_beside_it() {
     let step = world("floor", Vec::new()).present();
     let (scenery, camera) = red_wall();
-    // Red over blue on the floor 11 cm from the wall, and on the floor far from it.
+    // Ratio of red to blue on the floor 11 cm from the wall, and on the floor far away.
     let beside_and_away = |frame: Frame| {
         let redness = |column: usize| {
             let floor = (10..22).map(|row| &frame.rgb[(row * 48 + column) * 3..][..3]);

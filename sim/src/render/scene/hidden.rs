@@ -5,7 +5,8 @@ use rapier3d::math::{Pose, Vector};
 
 use crate::render::TriangleMesh;
 
-/// Minimum depth of a hidden triangle; less deep ones stay, since rounding may bring them out.
+/// Minimum depth of a hidden triangle. Triangles at smaller depths stay, since rounding may make them
+/// visible.
 const DEPTH_M: f32 = 1e-4;
 /// Maximum distance of a convex mesh's corners in front of its faces.
 const ROUNDING_M: f32 = 1e-5;

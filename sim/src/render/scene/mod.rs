@@ -31,7 +31,7 @@ pub struct Scenery {
     pub light: Light,
     /// Lights of the scene's file, in place of sun and sky.
     pub lamps: Option<Lamps>,
-    /// The room without anything in it, and in its own colours, for its light; `None` with `lamps`.
+    /// The empty room, from which its baked light is computed; `None` with `lamps`.
     pub room: Option<Arc<Scenery>>,
     /// Image around the camera where no surface is, or the six of a cube.
     pub sky: Option<Arc<Texture>>,
@@ -139,7 +139,7 @@ impl Part {
 }
 
 impl Scenery {
-    /// Collects everything in `world` that is drawn.
+    /// Collects all visible parts of `world`.
     pub fn of(world: &World) -> Scenery {
         let mut parts = Vec::new();
         add_parts(&mut parts, world.room(), Carrier::Room, ROOM_ID, |geom| geom.rgba);

@@ -36,8 +36,8 @@ pub fn taken(ideal_m: &[f32], map: &LensMap, seed: u64) -> Vec<f32> {
     depth_m
 }
 
-/// Removes the depth of points that the right imager does not see. In its image, a point is further left by
-/// its disparity, so nearer things cover what is to the left of them.
+/// Removes the depth of points that the right imager does not see. In its image, a point is shifted to the
+/// left by its disparity, so nearer surfaces cover the points to their left.
 fn hide(depth_m: &mut [f32], focal_px: f32) {
     let mut covered_from = f32::INFINITY;
     for (column, depth_m) in depth_m.iter_mut().enumerate().rev() {

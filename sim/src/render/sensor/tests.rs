@@ -1,4 +1,4 @@
-//! Laws of a D435i's images, on images whose ideal is known.
+//! Tests of a D435i's images, on images with known ideal ones.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 

@@ -34,7 +34,7 @@ pub struct ImagePlace {
     pub uv: [f32; 2],
     pub x_step_uv: [f32; 2],
     pub y_step_uv: [f32; 2],
-    /// Number of the image; 0 if there is one.
+    /// Index of the image; 0 if there is only one.
     pub face: usize,
 }
 
@@ -132,7 +132,8 @@ impl Image {
         (light_of(&texel), if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
     }
 
-    /// Returns the linear colour of the light that the surface emits at a place; `None` without a layer for it.
+    /// Returns the linear colour of the light that the surface emits at a place; `None` if it has no layer of
+    /// emission.
     #[inline(always)]
     pub fn emitted_rgb(&self, place: &ImagePlace, gloss: &Gloss) -> Option<[f32; 3]> {
         let texture = self.emitted.as_ref()?;

@@ -85,7 +85,7 @@ pub fn shown_rgb(
             own_lit += light.diffuse_rgb * (share * facing);
             own_glossy = light.specular_rgb * (share * shine(towards));
         }
-        // MuJoCo limits the light of each lamp with shadows by itself.
+        // MuJoCo limits the light of each lamp with shadows separately.
         if light.casts_shadow {
             shown += limited(own_lit, own_glossy);
         } else {

@@ -35,7 +35,7 @@ pub struct ObjectModel {
     pub name: String,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
-    /// Mass of this body alone, without the parts that move on it.
+    /// Mass of this body alone, without its moving parts.
     pub mass_kg: f32,
     /// Freedom of the body against the one that carries it; `None` unless it is a hinge or a slide.
     pub opening: Option<Opening>,
@@ -61,7 +61,7 @@ impl ObjectPart {
     fn of_scene(scene: &Document, body: &str, name: &str) -> Result<ObjectPart, SimError> {
         let SceneBody { link, carrier, .. } = scene.scene_body(body)?;
         let mut model = ObjectModel::of(&link);
-        // A motion relative to a body without a name of its own could not be described.
+        // A motion relative to a body without a name could not be described.
         if carrier.as_ref().is_some_and(|carrier| scene.scene_body(carrier).is_err()) {
             model.opening = None;
         }
@@ -126,7 +126,8 @@ impl ObjectModel {
         self.solid.encloses(point_m)
     }
 
-    /// Reads an object's file. Returns the document, and its one top-level body with everything on it.
+    /// Reads an object's file. Returns the document and its one top-level body, including the bodies that it
+    /// carries.
     pub(super) fn read(file: &ObjectFile) -> Result<(Document, BodyTree), SimError> {
         let document = match file {
             ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,

@@ -21,7 +21,7 @@ use measure::Trial;
 pub enum Subject<'a> {
     /// A base controller, under the arms' own drives.
     Base(&'a LocomotionChoice),
-    /// A policy that drives all motors by itself.
+    /// A policy that drives all motors, without a base controller.
     Motors(&'a LocomotionChoice),
 }
 

@@ -304,7 +304,7 @@ fn only_who_asks_for_operators_gets_them() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
 }
 
-/// An operator's texts are about its own robot and what it may do.
+/// An operator's texts describe its own robot and the calls that it may make.
 #[test]
 fn an_operators_tools_are_its_own() {
     let team = Team::start(json!({ "talk": true }));

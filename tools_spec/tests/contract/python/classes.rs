@@ -12,7 +12,7 @@ use super::{OF_DEPTH, OF_OBSERVE, OF_PLANS, OF_RESULT, OF_START, described, is_m
 /// Base class of all replies, which parses them.
 const BASE: &str = "Reply";
 
-/// The types of the contract, by what they are part of.
+/// The types of the contract, by the types that contain them.
 pub struct Contract<'a> {
     types: &'a Map<String, Value>,
     arguments: BTreeSet<String>,
@@ -43,7 +43,7 @@ impl<'a> Contract<'a> {
             start: BTreeSet::new(),
         };
         let on_episode = || tools.iter().filter(|tool| is_method(tool));
-        // All commands have the same reply, and every other tool has one of its own.
+        // All commands have the same reply. Every other tool has a separate one.
         let is_common = |reply: &str| on_episode().filter(|tool| tool.reply == reply).count() > 1;
         let all_of = |names: Vec<&str>, but: &[&BTreeSet<String>]| -> BTreeSet<String> {
             let all = names.into_iter().flat_map(|name| contract.reached_from(name));
@@ -216,7 +216,7 @@ impl<'a> Contract<'a> {
         }
     }
 
-    /// Returns the name of an enumeration of texts; nothing for another type.
+    /// Returns the name of an enumeration of texts; `None` for another type.
     fn choices(&self, lines: &mut Lines, name: &str) {
         let Some(values) = choices(&self.types[name]) else { return };
         lines.add(0, "");

@@ -8,7 +8,7 @@ use super::described;
 pub struct Parameter {
     /// Name on the wire.
     pub wire: String,
-    /// Name in Python, which has keywords of its own.
+    /// Name in Python, where some names are keywords.
     pub name: String,
     pub kind: String,
     pub about: String,

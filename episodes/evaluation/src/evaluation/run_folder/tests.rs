@@ -125,7 +125,7 @@ fn results_of_another_build_are_kept_and_marked() {
     assert_eq!(run.kept(), kept);
     assert_eq!(run.so_far().other_builds, [("0.0.1+older".to_owned(), 1)].into());
     drop(run);
-    // From now on it is a run of this build, which lists the other.
+    // From this moment the folder is a run of this build, which lists the other build.
     assert_eq!(EvaluationRun::begin(&own, folder.path()).unwrap().kept(), kept);
 }
 

@@ -44,8 +44,8 @@ fn columns(table: &Table) -> String {
     (0..table.head.len()).map(column).collect()
 }
 
-/// Joins the cells of a row. A bracket or a star at its beginning would be an argument of the line break
-/// before it.
+/// Joins the cells of a row. At the beginning of a row, LaTeX would read a bracket or a star as an argument
+/// of the line break before.
 fn row(cells: &[String]) -> String {
     let text = cells.iter().map(|cell| escape_tex(cell)).collect::<Vec<_>>().join(" & ");
     if text.starts_with(['[', '*']) { format!("{{}}{text}") } else { text }
@@ -83,7 +83,7 @@ pub fn escape_tex(text: &str) -> String {
             '°' => escaped += "$^\\circ$",
             '–' => escaped += "--",
             '’' => escaped.push('\''),
-            // Two in a row would be a dash.
+            // LaTeX would print two hyphens in a row as a dash.
             '-' if escaped.ends_with('-') => escaped += "{}-",
             character if character.is_whitespace() => escaped.push(' '),
             character if character.is_ascii_graphic() || is_accented(character) => escaped.push(character),

@@ -33,7 +33,7 @@ pub struct RobotMove {
     pub wrists: WristTargets,
 }
 
-/// Motion of one hand. A part that is `None` stays as it is.
+/// Motion of one hand. A part that is `None` does not change.
 #[derive(Clone, Copy, Debug)]
 pub struct HandMove {
     pub robot: usize,

@@ -22,7 +22,7 @@ pub struct Posture {
     pub wrists: Sides<Pose>,
 }
 
-/// Free distance of a path without obstacles: all of it.
+/// Free distance of a path without obstacles, which is its whole length.
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
 /// Postures by the distance gone.

@@ -36,7 +36,7 @@ pub struct Variety {
 }
 
 impl Variety {
-    /// Creates the variety of a level; `None` for level 0, at which nothing is drawn.
+    /// Creates the variety of a level; `None` for level 0, which has no variety.
     pub fn new(level: u8, seed: u32) -> Option<Variety> {
         if level == 0 {
             return None;
@@ -47,7 +47,7 @@ impl Variety {
         Some(variety)
     }
 
-    /// Returns the variety of one of several scripts that are played at once. Each has its own stream, so
+    /// Returns the variety of one of several scripts that are played at once. Each has a separate stream, so
     /// the order of draws between scripts does not matter.
     pub fn of_script(&self, script: usize) -> Variety {
         let mut own = self.clone();

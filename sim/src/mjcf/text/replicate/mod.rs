@@ -1,5 +1,5 @@
-//! Copies of the content of `<replicate>`, written out as MuJoCo makes them: each in a frame of its own, with
-//! its number behind all names. Contacts, equalities and actuators that name something in it are copied, too.
+//! Copies of the content of `<replicate>`, written out like MuJoCo's. Each has its own frame, and its number
+//! is appended to all names. Contacts, equalities and actuators that name something inside are copied, too.
 
 #[cfg(test)]
 mod tests;
@@ -209,7 +209,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         root.into_iter().flat_map(|root| root.children()).filter(move |node| node.has_tag_name(tag))
     }
 
-    /// Copies the elements of a section that name something in a replicate.
+    /// Copies the elements of a section that name an element of a replicate.
     fn copy_elements(&mut self, section: &'static str) -> Result<(), SimError> {
         let nodes = self.section(section).flat_map(|section| section.children()).filter(Node::is_element);
         let (mut found, mut removed) = (Vec::new(), Vec::new());
@@ -227,7 +227,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         Ok(())
     }
 
-    /// Returns an element of a section; `None` if it names nothing in a replicate.
+    /// Returns an element of a section; `None` if it names no element of a replicate.
     fn element(&self, node: &Node, section: &str) -> Result<Option<CopiedElement>, SimError> {
         let mut names = Vec::new();
         for (kind, attributes) in REFERENCES {
@@ -257,7 +257,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         Ok(Some(CopiedElement { range: node.range(), names }))
     }
 
-    /// Replaces elements that name something in a replicate by their copies, behind all others.
+    /// Replaces elements that name an element of a replicate by their copies, behind all others.
     fn copied(
         &self,
         elements: Vec<CopiedElement>,

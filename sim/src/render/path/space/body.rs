@@ -16,7 +16,7 @@ use crate::render::{Part, Scenery};
 /// Sides of triangles that a ray can meet.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum MetSides {
-    /// The front, as for a rasteriser: a camera inside of its robot's head sees out of it.
+    /// The front is as for a rasteriser: a camera inside of its robot's head sees through the head.
     Front,
     Both,
 }

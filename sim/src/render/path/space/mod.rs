@@ -87,7 +87,7 @@ impl<'a> Space<'a> {
         nearest.map(|nearest| (nearest.hit.reach_m, nearest))
     }
 
-    /// Returns true if something is between a point and another `reach_m` away.
+    /// Returns true if there is a surface between a point and another `reach_m` away.
     #[inline]
     pub fn is_blocked(&self, origin_m: Vector, direction: Vector, reach_m: f32) -> bool {
         let (origin_m, direction) = (origin_m.into(), direction.into());

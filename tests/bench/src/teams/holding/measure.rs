@@ -32,8 +32,8 @@ pub(super) struct HoldMeasure<'a> {
     steps: u32,
     began_m: Vec<Vector>,
     rested_m: Vec<Vector>,
-    /// Middle of the wrists at the command to stand, in the object's frame. Points below it would also
-    /// measure a table's swing.
+    /// Midpoint of the wrists at the command to stand, in the object's frame. A point further below would
+    /// also measure the swing of a table.
     held_in_object_m: Vector,
     load_m: VecDeque<Vector>,
     load_rested_m: Option<Vector>,

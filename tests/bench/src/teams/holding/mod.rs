@@ -1,8 +1,8 @@
-//! Teams that hold something between them and are commanded to stand: cases of the bench of base
-//! controllers that need hands.
+//! Teams that hold an object together and are commanded to stand: cases of the bench of base controllers that
+//! need hands.
 //!
-//! They take an object as the experts do, lift it and, in some cases, walk a short way with it. Then all
-//! bases are commanded to stand and all arms to stay as they are, except for the case's disturbance.
+//! They take an object like the experts do, lift it and, in some cases, walk a short way with it. Then all
+//! bases are commanded to stand and all arms to keep their posture, except for the case's disturbance.
 
 mod disturbance;
 pub(super) mod loads;

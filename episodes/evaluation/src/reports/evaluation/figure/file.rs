@@ -59,8 +59,8 @@ pub fn rates_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     file(drawings, legend.chain([bar]).chain(colours(policies)).collect())
 }
 
-/// Returns the file with the curves of the times at which phases were reached, by task. Tasks of which no
-/// phase was reached are named in the legend.
+/// Returns the file with the curves of the times at which phases were reached, by task. The legend names the
+/// tasks in which no phase was reached.
 pub fn times_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     let phases = policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.phases.len()).max();
     let line = |number: usize| LegendLine {

@@ -9,7 +9,8 @@ use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
-/// Time that hands take to their first stop, to the next, and from the last to where they close.
+/// Durations of the hands' motions: to their first stop, to the next stop, and from the last stop to the
+/// place where they close.
 const TO_FIRST_STOP_S: f32 = 0.9;
 const BETWEEN_STOPS_S: f32 = 0.6;
 const FROM_LAST_STOP_S: f32 = 0.5;
@@ -106,7 +107,7 @@ fn stops(grasps: &[HandGrasp]) -> usize {
 }
 
 /// Opens hands in place, because opening fingers push. The hands then leave by the stops by which they came.
-/// Hands that still touch something repeat this once, and yield to the obstacle.
+/// Hands that still touch an object repeat this once, and yield to the obstacle.
 pub fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     open_in_place(commander, grasps)?;
     for stop in (0..stops(grasps)).rev() {
