@@ -42,7 +42,7 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// True if it is for programs: language models are not offered it.
     const FOR_PROGRAMS: bool = false;
 
-    /// Valid arguments, shown to callers after a refusal.
+    /// Returns valid arguments, shown to callers after a refusal.
     fn example() -> Self;
 
     /// Returns the robots that the arguments name, each as often as they name it.
@@ -91,7 +91,8 @@ pub fn read_as<T: DeserializeOwned>(
     })
 }
 
-/// Nullable fields are optional, and not every form of the contract has null.
+/// Removes the fields that are null. Nullable fields are optional, and not every form of the contract has
+/// null.
 fn without_nulls(value: Value) -> Value {
     match value {
         Value::Array(items) => items.into_iter().map(without_nulls).collect(),

@@ -242,7 +242,7 @@ impl Recording {
         self.messages(topics::NOTES).collect()
     }
 
-    /// Returns the setpoints of a robot's motors in every control step in which it was driven by any.
+    /// Returns the setpoints of a robot's motors for every control step in which setpoints drove it.
     ///
     /// # Errors
     ///

@@ -86,11 +86,11 @@ pub struct OperatorMemory {
 /// State of the other operators, from the view of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Others {
-    /// At least one plays.
+    /// At least one other operator plays.
     There,
-    /// None has commanded within the others' patience.
+    /// No other operator has commanded within the patience.
     Away,
-    /// All have finished.
+    /// All other operators have finished.
     Gone,
 }
 

@@ -40,7 +40,8 @@ struct PlaceResult {
     /// Final distance of a pelvis from its place; `off_rad` is its heading error.
     off_m: f64,
     off_rad: f64,
-    /// Horizontal displacement of wrists relative to their pelvis, after a call, against before the first.
+    /// Change of the wrists' horizontal position relative to their pelvis, from before the first call to
+    /// after this one.
     squeezed_m: f64,
 }
 
