@@ -158,7 +158,7 @@ impl NativeRecording {
         Ok((shaped(py, &rgb, [height, width, 3])?, shaped(py, &depth_m, [height, width])?))
     }
 
-    /// Renders only the colours, as a policy gets them that requests this size.
+    /// Renders only the colours, like the image of a policy that requests this size.
     fn colours<'py>(
         &self,
         py: Python<'py>,

@@ -173,8 +173,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Forgets the sleeping episodes that other servers have taken over or ended. Call it every few
-    /// seconds.
+    /// Forgets the suspended episodes that other servers have taken over or ended. Call it every few seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {

@@ -410,8 +410,8 @@ impl EpisodeTable {
     /// Takes no more episodes, ends those that are held after the calls already waiting, and closes every
     /// file.
     ///
-    /// Returns when all are closed or after `limit`, with the names of those that were not closed by
-    /// then. With `keep`, episodes go on when they are brought back; sleeping episodes always do.
+    /// Returns when all are closed or after `limit`, with the names of those that were not closed by then.
+    /// With `keep`, episodes go on when they are brought back; suspended episodes always do.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {

@@ -27,7 +27,7 @@ pub struct DoctorArgs {
 enum Finding {
     /// Success, with a description.
     Works(String),
-    /// A note on something that may be unintended.
+    /// A note on a setting that may be unintended.
     Note(String),
     /// A failure, with advice.
     Wrong(String),

@@ -125,7 +125,7 @@ impl EpisodeThread {
         }
     }
 
-    /// Returns true if the episode could be put to sleep.
+    /// Returns true if the episode could be suspended.
     pub fn may_sleep(&self) -> bool {
         let Stage { status, feed, memory, .. } = &*self.stage;
         status.durable.load(Ordering::Relaxed)

@@ -75,7 +75,7 @@ impl JobQueue {
 
     /// Queues a job, however many are waiting.
     pub async fn send_in_turn(&self, mut job: Job) -> Result<(), HostingError> {
-        // The episode may fall asleep after `sender` has returned.
+        // The episode may be suspended after `sender` has returned.
         while let Err(mpsc::error::SendError(unsent)) = self.sender()?.send(job).await {
             job = unsent;
         }

@@ -78,7 +78,7 @@ impl Stage {
         }
     }
 
-    /// Removes the journal of a sleeping episode, which will not be brought back.
+    /// Removes the journal of a suspended episode, which will not be brought back.
     pub fn forget_journal(&self) -> Result<(), HostingError> {
         let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
             return Ok(());
