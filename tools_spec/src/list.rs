@@ -99,7 +99,7 @@ macro_rules! tools {
                     }
                 }
 
-                /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+                /// Returns the number of requested control steps of 20 ms, which is 0 for calls other than commands.
                 pub fn steps(&self) -> u32 {
                     match self {
                         $( $call::$tool(args) => args.steps(), )*
@@ -167,7 +167,7 @@ macro_rules! tools {
                 }
             }
 
-            /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+            /// Returns the number of requested control steps of 20 ms, which is 0 for calls other than commands.
             pub fn steps(&self) -> u32 {
                 match self {
                     $( ToolCall::$group(call) => call.steps(), )*

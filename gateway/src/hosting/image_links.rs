@@ -31,7 +31,7 @@ impl ImageLinks {
         for CameraImage { robot, png_base64 } in std::mem::take(&mut seen.images) {
             let name = format!("{step}-{robot}.png");
             let path = format!("/v1/episodes/{episode}/images/{name}");
-            // Another look at the same step shows the same.
+            // A second observation of the same step gives the same image.
             kept.retain(|image| image.name != name);
             kept.push_back(LinkedImage { robot: robot.clone(), png: png_base64.0.into(), name });
             seen.links.push(ImageLink { robot, path });

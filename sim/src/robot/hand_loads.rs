@@ -101,7 +101,7 @@ impl HandLoads {
         self.force.each_ref().map(HandForce::force_n)
     }
 
-    /// Returns the same with the inertia of the moving arm: the load of each arm on the trunk.
+    /// Returns the force on each hand plus the inertia of the moving arm, which is the load on the trunk.
     pub(super) fn reaction_n(&self) -> Sides<Vector> {
         self.reaction.each_ref().map(HandForce::force_n)
     }
