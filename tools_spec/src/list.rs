@@ -99,7 +99,7 @@ macro_rules! tools {
                     }
                 }
 
-                /// Returns the number of requested control steps of 20 ms, which is 0 for calls other than commands.
+                /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
                 pub fn steps(&self) -> u32 {
                     match self {
                         $( $call::$tool(args) => args.steps(), )*
@@ -167,7 +167,7 @@ macro_rules! tools {
                 }
             }
 
-            /// Returns the number of requested control steps of 20 ms, which is 0 for calls other than commands.
+            /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
             pub fn steps(&self) -> u32 {
                 match self {
                     $( ToolCall::$group(call) => call.steps(), )*
