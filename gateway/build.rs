@@ -18,7 +18,7 @@ fn main() {
     pack_script();
 }
 
-/// Writes the script with gzip to the folder of what is built.
+/// Writes the script, compressed by gzip, to the build's output folder.
 fn pack_script() {
     let script = fs::read(SCRIPT).expect("the script of the pages");
     let folder = env::var("OUT_DIR").expect("Cargo says where to write");

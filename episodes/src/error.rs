@@ -42,7 +42,7 @@ pub enum EpisodeError {
     #[error("{}", no_surface(query, seen))]
     NoSurface {
         query: SurfaceQuery,
-        /// Colours that are visible in part, where the query has one.
+        /// Colours that are partly visible, for a query by colour.
         seen: Vec<Color>,
     },
     #[error(

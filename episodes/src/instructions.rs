@@ -1,5 +1,5 @@
-//! Instructions from a file, in place of the tasks' own wording: other languages, other styles, a
-//! benchmark's exact wording.
+//! Instructions from a file that replace the tasks' wording: other languages, other styles, a benchmark's
+//! exact wording.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ impl Instructions {
         Ok(instructions)
     }
 
-    /// Returns the place of the first empty text, task or file; `None` if nothing is empty.
+    /// Returns the place of the first empty text, task or file; `None` if there is none.
     fn empty_place(&self) -> Option<String> {
         if self.0.is_empty() {
             return Some("the file".into());

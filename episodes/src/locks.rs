@@ -16,7 +16,7 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 /// Kind of a lock: exclusive or shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LockKind {
-    /// At most one holder.
+    /// A lock with at most one holder.
     Exclusive,
     /// Any number of holders of shared locks.
     Shared,
@@ -28,7 +28,7 @@ pub enum Locking {
     Locked(FileLock),
     /// Another process, or another thread of this one, holds the lock.
     Held,
-    /// The file system has no locks, so nobody can hold one.
+    /// The file system has no locks, so there is never a holder.
     Unsupported,
 }
 

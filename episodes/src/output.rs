@@ -54,8 +54,8 @@ pub fn shell_word(text: &str) -> String {
     }
 }
 
-/// Writes a file atomically: under another name first, then renamed once it is complete and on the disk.
-/// A reader sees the whole file or nothing, even after a power cut. A failed write leaves nothing behind.
+/// Writes a file atomically: under another name first, then renamed once it is complete and on the disk. A
+/// reader sees the whole file or no file, even after a power cut. A failed write removes its temporary file.
 ///
 /// # Errors
 ///
@@ -64,7 +64,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_whole_as(&own_partial_path(path), path, bytes)
 }
 
-/// Writes a file like [`write_whole`], with `under_way` as its temporary name. For files whose usual
+/// Writes a file like [`write_whole`], with `under_way` as its temporary name. Use it for files whose usual
 /// temporary name belongs to another file.
 pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let written = File::create(under_way).and_then(|mut file| {

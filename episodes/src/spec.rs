@@ -48,7 +48,7 @@ pub struct EpisodeSpec {
     /// Source of the robots' state. Recordings of builds without this choice used the simulator's own.
     #[serde(default = "before_there_was_a_choice")]
     pub sensing: Sensing,
-    /// Renderer of the robots' images; it affects nothing else.
+    /// Renderer of the robots' images. It has no other effect.
     pub renderer: RendererKind,
     /// Model of the robots' cameras.
     #[serde(default, skip_serializing_if = "CameraModel::is_ideal")]
@@ -78,8 +78,8 @@ pub struct EpisodeSpec {
     /// Seed drawn by an evaluator's key, if there is a key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
-    /// By whom the robots are commanded. Where each has its own operator, each has a clock of its own, which
-    /// the host keeps.
+    /// Kind of command over the robots: by one policy, or by one operator for each robot. Operators have
+    /// clocks of their own, which the host keeps.
     #[serde(default, skip_serializing_if = "Operators::is_one")]
     pub operators: Operators,
 }
@@ -173,7 +173,7 @@ impl EpisodeSpec {
         Rules { thinking: own.or(rules.thinking), ..rules }
     }
 
-    /// Returns the spec with another assistance, and with the disclosure and hints that belong to it.
+    /// Returns the spec with another assistance, and with the disclosure and hints of that assistance.
     pub fn assisted(self, assistance: Assistance) -> EpisodeSpec {
         EpisodeSpec { assistance, disclosure: assistance.disclosure(), hints: assistance.hints(), ..self }
     }
@@ -203,8 +203,8 @@ impl EpisodeSpec {
     /// Lists the departures from Tandem's defaults, each as shown after the policy's name. A new setting
     /// must be classified here.
     pub fn peculiarities(&self) -> Vec<String> {
-        // The pattern has no `..`, so the compiler reports every new field. Left out are fields that are
-        // shown elsewhere and fields whose effect no policy could notice.
+        // The pattern has no `..`, so the compiler reports every new field. It leaves out fields that are
+        // shown elsewhere and fields without an effect that a policy could notice.
         let EpisodeSpec {
             task,
             seed: _,

@@ -94,9 +94,8 @@ struct SlowNoise {
 }
 
 impl Disturbance {
-    /// Returns the noise of an episode under `seed`; `None` for an undisturbed one. The strength is drawn
-    /// for each episode: all of `level` in 50 %, half of it in 30 %, and none in 20 %, which show
-    /// undisturbed motion.
+    /// Returns the noise of an episode under `seed`; `None` for an undisturbed one. The strength is drawn for
+    /// each episode: `level` in 50 %, half of it in 30 %, and 0 in 20 %, which show undisturbed motion.
     pub fn new(level: f32, seed: u32, robots: usize) -> Option<Disturbance> {
         let mut random = SplitMix64(u64::from(seed) ^ STREAM);
         let strength = match random.uniform([0.0, 1.0]) {
@@ -109,7 +108,7 @@ impl Disturbance {
         (scale > 0.0).then(|| Disturbance { robots: (0..robots).map(|_| robot()).collect() })
     }
 
-    /// Returns the command that robot number `robot` executes at `time_s` in place of `told`.
+    /// Returns the command that robot number `robot` executes at `time_s`, which replaces `told`.
     pub fn executed(
         &self,
         robot: usize,
@@ -186,7 +185,7 @@ mod tests {
         // clamped.
         let later = mean(&|noise| noise.at(3.0) * noise.at(3.0 + ARM.time_s)) / variance;
         assert!((0.25..0.5).contains(&later), "{later}");
-        // A joint's target moves much less in a control step than the noise is large.
+        // In a control step a joint's target moves by much less than the amplitude of the noise.
         let step = mean(&|noise| (noise.at(3.02) - noise.at(3.0)).powi(2)).sqrt();
         assert!(step < 0.25 * ARM.deviation, "{step}");
         let again = SlowNoise::new(ARM, 1.0, &mut SplitMix64(17));

@@ -14,7 +14,8 @@ use tandem_episodes::{LiveChannel, LiveRecording, LiveViewer};
 /// long command plays at once.
 const MAX_WAITING_MESSAGES: usize = 16_384;
 
-/// Schema of shapes. All messages describe the present, and not only the latest.
+/// Schema of shapes. A client needs all messages of this schema to draw the present scene, and not only the
+/// latest.
 const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
 
 /// Server of the recording that began last, for clients of Foxglove. Clones share it.
@@ -94,14 +95,14 @@ impl FoxgloveServer {
 }
 
 impl LiveViewer for FoxgloveServer {
-    /// Shows a new recording in place of the one before.
+    /// Shows a new recording, which replaces the one before.
     fn begin(&self) -> Box<dyn LiveRecording> {
         let (number, before) = {
             let mut shown = self.shown();
             let number = shown.number + 1;
             (number, mem::replace(&mut *shown, Shown { number, ..Shown::default() }))
         };
-        // A channel that closes calls its clients, who may be asking for messages at the same time.
+        // Closing a channel calls its clients, and these may be requesting messages at the same time.
         before.channels.iter().for_each(|shown| shown.channel.close());
         if let Some(server) = self.0.server.get() {
             server.clear_session(None);
@@ -150,7 +151,7 @@ impl LiveRecording for ShownRecording {
     }
 }
 
-/// Sends what is kept of a channel to clients that subscribe to it.
+/// Sends the stored messages of a channel to clients that subscribe to it.
 struct Latecomers(Weak<Shared>);
 
 impl ServerListener for Latecomers {

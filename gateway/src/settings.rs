@@ -449,7 +449,7 @@ impl Settings {
     }
 }
 
-/// Parses a flag whose value is the name of one of `all`. `--help` and errors list the names.
+/// Parses a flag that takes the name of one of `all`. `--help` and errors list the names.
 pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,

@@ -1,10 +1,10 @@
-// Makes dist/page.js of src/, home/ and operators/. With --check, says whether the committed file is what the sources give, and changes nothing.
+// Makes dist/page.js of src/, home/ and operators/. With --check, reports whether the committed file matches the sources, and writes nothing.
 import { readFile, writeFile } from "node:fs/promises";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
 const OUT = new URL("dist/page.js", import.meta.url);
-/** A page is for who has a link and a telephone. */
+/** Maximum size of the compressed script, so that pages load quickly on telephones. */
 const MOST_GZIP_BYTES = 200_000;
 
 const licence = await readFile(new URL("node_modules/three/LICENSE", import.meta.url), "utf8");

@@ -1,4 +1,4 @@
-// Lints of the pages and of the scripts in tests/peers/pages: ESLint's recommended rules and a few more, none about format.
+// Lints of the pages and of the scripts in tests/peers/pages: ESLint's recommended rules and a few more, without rules for formatting.
 import js from "@eslint/js";
 import globals from "globals";
 

@@ -13,7 +13,7 @@ pub enum IkError {
     /// A file of targets cannot be read.
     #[error("not a valid targets file: {0}")]
     Targets(#[from] serde_json::Error),
-    /// The file contains something that this crate does not support.
+    /// The file contains an element that this crate does not support.
     #[error("{0}")]
     Unsupported(String),
     /// A frame is not in the model.

@@ -41,7 +41,7 @@
 //! # }
 //! ```
 //!
-//! The same for a robot's file: only its right arm may move, and a wrist goes to a target.
+//! This example uses a robot's file: only its right arm may move, and a wrist goes to a target.
 //!
 //! ```
 //! use tandem_ik::{Configuration, FrameTask, Model, Outcome, SolveOptions, Solver, Task};

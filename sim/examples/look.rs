@@ -1,6 +1,6 @@
-//! Draws a scene without robots, as it is loaded, into a PNG file, and prints the median duration of an image:
-//! `look FILE RENDERER WIDTH HEIGHT FIELD_OF_VIEW_RAD EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z OUT`, in metres.
-//! `tests/peers/worlds/looks.py` compares it with MuJoCo.
+//! Draws the start state of a scene without robots into a PNG file, and prints the median duration of an
+//! image: `look FILE RENDERER WIDTH HEIGHT FIELD_OF_VIEW_RAD EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z OUT`, in
+//! metres. `tests/peers/worlds/looks.py` compares it with MuJoCo.
 
 use std::error::Error;
 use std::path::Path;

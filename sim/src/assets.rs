@@ -11,7 +11,7 @@ static ASSETS: Dir = include_dir!("$TANDEM_SIM_ASSETS");
 /// The robot used unless another file is given.
 pub const DEFAULT_ROBOT: &str = "g1_dex3";
 
-/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree:
+/// Name of the robot with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree:
 /// 35 N m in place of 50 at ankles, waist roll and waist pitch.
 pub const URDF_EFFORTS_ROBOT: &str = "g1_dex3_urdf_efforts";
 

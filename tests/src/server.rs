@@ -95,7 +95,7 @@ impl TestServer {
         assert!(left.is_empty(), "{left:?} did not end");
     }
 
-    /// Stops the server like SIGTERM, and starts another on the same folder of runs.
+    /// Stops the server as SIGTERM does, and starts another on the same folder of runs.
     pub fn restart(&mut self, guests: Guests) {
         let left = self.server.take().expect("a running server").stop_keeping();
         assert!(left.is_empty(), "{left:?} did not stop");

@@ -10,7 +10,7 @@ use std::thread;
 /// Printed lines; each is printed once.
 static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// Reports that the test on this thread skips something, and why.
+/// Reports that the test on this thread skips a check, and the reason.
 pub fn skipped(reason: &str) {
     let thread = thread::current();
     let line = match thread.name() {

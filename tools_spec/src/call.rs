@@ -1,5 +1,5 @@
-//! A call on an episode as a program makes it: the tool, and what may stand beside the tool's own
-//! arguments. Models are shown none of that: it stands in the schemas of bodies, not in those of tools.
+//! A call on an episode by a program: the tool, and the fields beside the tool's own arguments. Models do not
+//! see these fields: they are in the schemas of bodies, and not in those of tools.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -21,19 +21,20 @@ pub struct Call {
     /// The tool and its arguments.
     #[serde(flatten)]
     pub tool: ToolCall,
-    /// Formats of images, where the tool is `observe`.
+    /// Formats of images, if the tool is `observe`.
     #[serde(flatten)]
     pub formats: Formats,
-    /// The step that the episode has to stand at, where the tool is a command.
+    /// Required step of the episode, if the tool is a command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_step: Option<u32>,
     /// Observation to make once a command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
-    /// True for the readings of every physics step, where the tool is `get_robot_state` or `observe`.
+    /// True for the readings of every physics step, if the tool is `get_robot_state` or `observe`.
     #[serde(skip_serializing_if = "is_false")]
     pub samples: bool,
-    /// True for a reply without what is as expected. Observations have a field of their own for that.
+    /// True for a short reply, without values that are as expected. Observations have a separate field for
+    /// that.
     #[serde(skip_serializing_if = "is_false")]
     pub short: bool,
 }
@@ -54,7 +55,7 @@ impl WithAll {
     const FIELDS: [&str; 1] = ["short"];
 }
 
-/// An observation, and how its pictures are to come.
+/// An observation, and the formats of its images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Look {
     /// The observation.
@@ -96,7 +97,7 @@ impl WithCommand {
 }
 
 impl Call {
-    /// Reads the call of tool `name` with arguments `args` and whatever stands beside them.
+    /// Parses the call of tool `name` with the arguments `args` and the fields beside them.
     pub fn parse(name: &str, mut args: Value) -> Result<Call, SpecError> {
         let short = match EPISODE_TOOLS.iter().find(|tool| **tool == name && name != Observe::NAME) {
             Some(tool) => beside::<WithAll>(tool, &mut args, &WithAll::FIELDS)?.short.unwrap_or(false),
@@ -131,7 +132,7 @@ impl Call {
         self.tool.name()
     }
 
-    /// Returns the robots that the call and the look after it name.
+    /// Returns the robots that the call and the observation after it name.
     pub fn robots(&self) -> Vec<&str> {
         let then = self.then.iter().flat_map(|look| look.observe.robots());
         self.tool.robots().into_iter().chain(then).collect()
@@ -142,8 +143,8 @@ impl Call {
         self.tool.steps()
     }
 
-    /// Returns true for `observe` with `short`, which is among its arguments, by a reader of pictures. Programs
-    /// that ask for arrays get the numbers as they are.
+    /// Returns true for `observe` with `short` among its arguments, if its caller reads images. Programs that
+    /// request arrays get all numbers.
     pub fn looks_shortly(&self) -> bool {
         let is_short =
             matches!(&self.tool, ToolCall::Look(LookCall::Observe(args)) if args.short == Some(true));
@@ -197,7 +198,7 @@ impl From<Look> for Call {
 }
 
 impl Look {
-    /// Reads arguments of `observe` with formats among them.
+    /// Parses arguments of `observe` with formats among them.
     pub fn parse(mut args: Value) -> Result<Look, SpecError> {
         let formats = beside(Observe::NAME, &mut args, &Formats::FIELDS)?;
         Ok(Look { observe: parse_args(args)?, formats })
@@ -236,27 +237,27 @@ impl SendPlan {
     }
 }
 
-/// One command of a plan, read.
+/// A parsed command of a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
     /// Name of its place in messages.
     pub place: String,
     /// The command.
     pub call: PlannedCall,
-    /// Conditions that have to hold after it.
+    /// Conditions that have to hold after the command.
     pub expects: Expectation,
-    /// True where it ends as soon as they hold.
+    /// True if the command ends as soon as they hold.
     pub until: bool,
-    /// True for a short reply, where it is the last command that is carried out.
+    /// True for a short reply, if it is the last executed command.
     pub short: bool,
 }
 
-/// A call that a plan may hold.
+/// A call that a plan may contain.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PlannedCall {
     /// One command.
     Act(ActCall),
-    /// A walk to a place, which is several.
+    /// A walk to a place, which consists of several commands.
     WalkTo(WalkTo),
 }
 
@@ -270,7 +271,7 @@ impl PlannedCall {
     }
 }
 
-/// Reads the arguments of `start_episode`, and by whom the episode is to be driven.
+/// Parses the arguments of `start_episode`, and the fields on the drivers of the episode.
 pub fn parse_start(mut args: Value) -> Result<(StartEpisode, Driving), SpecError> {
     let driving: Driving = beside(StartEpisode::NAME, &mut args, &Driving::FIELDS)?;
     let invalid = |reason| SpecError::Invalid { tool: StartEpisode::NAME, reason };
@@ -278,7 +279,7 @@ pub fn parse_start(mut args: Value) -> Result<(StartEpisode, Driving), SpecError
     Ok((parse_args(args)?, driving))
 }
 
-/// Takes `fields` out of the arguments of `tool` and reads them.
+/// Takes `fields` out of the arguments of `tool` and parses them.
 fn beside<T: DeserializeOwned + Default>(
     tool: &'static str,
     args: &mut Value,
@@ -294,7 +295,8 @@ fn beside<T: DeserializeOwned + Default>(
         .map_err(|error| SpecError::Invalid { tool, reason: format!("{}: {}", error.path(), error.inner()) })
 }
 
-/// Returns every tool, with what programs may send beside its arguments in the schema of its body.
+/// Returns every tool. The schema of its body includes the fields that programs may send beside its
+/// arguments.
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     let wording = wording.into();
     let mut specs = every_tool_spec(wording);
@@ -339,7 +341,7 @@ fn properties_of(mut schema: Value) -> Map<String, Value> {
     schema["properties"].as_object_mut().map(std::mem::take).unwrap_or_default()
 }
 
-/// Returns the schema of `observe` beside a command, which is still to be worded with the command's own.
+/// Returns the schema of `observe` beside a command. Its texts are replaced together with the command's own.
 fn observe_properties() -> Value {
     let own = properties_of(plain_schema::<Observe>()).into_iter();
     json!(own.chain(properties_of(plain_schema::<Formats>())).collect::<Map<_, _>>())
@@ -389,7 +391,7 @@ mod tests {
         assert_eq!(json!(Call::from(ToolCall::from(GetStatus::default()))), json!({}));
     }
 
-    /// A short reply is asked of every tool alike, and what is written of that is read back.
+    /// Every tool has the same field for a short reply, and its serialised form can be parsed.
     #[test]
     fn every_tool_takes_short() {
         for call in ToolCall::examples() {

@@ -1,5 +1,5 @@
-//! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what
-//! would work.
+//! Checks that need no world. Each returns a sentence for the caller, with the mistake, its place and a valid
+//! value.
 
 use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
@@ -29,7 +29,7 @@ pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String>
     Ok(())
 }
 
-/// Checks a position and an orientation, each of which may be left out.
+/// Checks a position and an orientation. Each may be left out.
 pub fn pose(
     side: &str,
     position_m: Option<&[f64; 3]>,
@@ -67,7 +67,7 @@ pub fn robots(names: &[&str]) -> Result<(), String> {
     }
 }
 
-/// With this stride a region of a whole picture fits.
+/// A region of the whole image fits with this stride.
 const WIDEST_STRIDE: u32 = 20;
 
 /// Checks that there is at least one pixel, and not too many. The episode checks that they are in the image.

@@ -1,19 +1,19 @@
-//! Errors of a call that are found before any world is asked.
+//! Errors of a call that are found without a world.
 
 use serde_json::Value;
 
 use crate::refusal::{Refusal, RefusalClass};
 
-/// A call that does not fit the contract. The text says what would work, because its reader is often a
+/// A call that does not fit the contract. The text says which call would work, because its reader is often a
 /// language model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecError {
     /// The name is not one of the tools that act on an episode.
     #[error("no tool {name:?}; have: {}", .have.join(", "))]
     UnknownTool {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// Every name that would have worked.
+        /// All valid names.
         have: Vec<&'static str>,
     },
     /// The arguments do not have the tool's fields and types.
@@ -39,7 +39,8 @@ pub enum SpecError {
 }
 
 impl SpecError {
-    /// Returns the error for a caller that names the episode among the arguments, as the example then does.
+    /// Returns the error for a caller that names the episode among the arguments. Its example then does so,
+    /// too.
     pub fn naming_episode(mut self, id: &str) -> SpecError {
         if let SpecError::Malformed { example, .. } = &mut self
             && let Ok(Value::Object(arguments)) = serde_json::from_str(example)

@@ -1,10 +1,11 @@
 //! The wire contract: every tool that a policy can call, with its arguments, its reply and its JSON Schema.
 //!
-//! The doc comments of the argument types are the text that a language model reads, so they say units,
-//! frames and what happens. Nothing here knows the simulator: [`Call::parse`] checks what can be checked
-//! without looking at a world.
+//! The doc comments of the argument types are the text that a language model reads, so they state units,
+//! frames and effects. Nothing here depends on the simulator: [`Call::parse`] makes the checks that need no
+//! world.
 //!
-//! To add a tool: one file in `tools/` and its line in `list.rs`. What does not answer it yet does not compile.
+//! To add a tool: one file in `tools/` and its line in `list.rs`. Code that does not handle it yet does not
+//! compile.
 
 #![warn(missing_docs)]
 

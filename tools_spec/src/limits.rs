@@ -3,17 +3,17 @@
 
 use serde_json::{Value, json};
 
-/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a
-/// larger one would overflow the single precision of the physics.
+/// Maximum absolute value of a number of the contract. Sensible values in metres, radians or metres per
+/// second are far smaller; larger ones would overflow the single precision of the physics.
 pub const LARGEST: f64 = 1e6;
 
-/// A quaternion whose largest component is smaller has no direction.
+/// Minimum of the largest component of a quaternion. With less it has no direction.
 pub const SMALLEST_COMPONENT: f64 = 1e-6;
 
-/// The most control steps that any protocol allows for one command.
+/// Maximum number of control steps of one command under any protocol.
 pub const MAX_STEPS: u32 = 50;
 
-/// The most pixels that one call may ask for.
+/// Maximum number of pixels of one call.
 pub const MAX_PIXELS: usize = 4096;
 
 /// Names of robots, of which an episode has the first two or three.
@@ -80,9 +80,8 @@ fn has(field: &str, kind: &str) -> Value {
     json!({ "required": [field], "properties": { field: { "type": kind } } })
 }
 
-/// Says how many control steps a command may have wherever `most_steps` marks that something counts them:
-/// as `maximum`, as `maxItems`, or as `equal_rows`, a list with an entry per robot whose rows are equally
-/// many.
+/// Limits the number of control steps of a command at each mark `most_steps`: as `maximum`, as `maxItems`, or
+/// as `equal_rows`. The last is a list with an entry per robot, which all have equally many rows.
 pub fn bound_steps(schema: &mut Value, most_steps: u32) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_steps(item, most_steps)),
@@ -107,7 +106,7 @@ fn equal_rows(most_steps: u32) -> Value {
     (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
-/// Lets every name of a robot be one of `robots`, and lists with an entry per robot have as many at most.
+/// Restricts names of robots to `robots`, and lists with an entry per robot to their number.
 pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_robots(item, robots)),
@@ -124,7 +123,7 @@ pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     }
 }
 
-/// Bounds every number of a schema where it has no bound of its own. Integers are left alone, whose types
+/// Bounds every number of a schema that has no bound of its own. Integers stay unchanged, because their types
 /// bound them.
 pub fn bound_numbers(schema: &mut Value) {
     match schema {

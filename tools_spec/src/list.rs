@@ -1,5 +1,4 @@
-//! The one list of tools: what a caller may ask, what it gets back and how both are read follow from a
-//! tool's line here.
+//! The list of tools. The line of a tool determines its call, its reply, and how both are parsed.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -10,25 +9,24 @@ use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
 
-/// Makes all that has to know every tool. A tool is the one line with the type of its arguments, in the
-/// group of what it does:
+/// Generates all code that depends on every tool. A tool is one line with the type of its arguments, in the
+/// group of its kind:
 ///
 /// ```text
-/// /// Asks how things stand.
+/// /// A question about the state of things.
 /// Look(LookCall) -> each LookReply {
 ///     QueryDepth,
 /// }
 /// ```
 ///
-/// That line adds `query_depth` to the names and to the specifications; the variants
-/// `LookCall::QueryDepth`, with the arguments, and `LookReply::QueryDepth`, with the tool's own
-/// `Tool::Reply`; a `From<QueryDepth>` for `ToolCall`; and its arms where calls are read, named, checked
-/// and asked for their robots and steps, and where replies are read. Whoever answers `LookCall`s does not
-/// compile until it answers this one.
+/// That line adds `query_depth` to the names and to the specifications; the variants `LookCall::QueryDepth`,
+/// with the arguments, and `LookReply::QueryDepth`, with the tool's own `Tool::Reply`; a `From<QueryDepth>`
+/// for `ToolCall`; and its arms where calls are read, named, checked and asked for their robots and steps,
+/// and where replies are read. Code that answers `LookCall`s does not compile until it handles this one.
 ///
-/// In a group with `-> each R`, `R` is made here and every tool has a reply of its own; with `-> all R`,
+/// In a group with `-> each R`, `R` is generated here and every tool has a reply of its own; with `-> all R`,
 /// every tool of the group replies with the existing type `R`. A group `for operators` is offered only in
-/// episodes whose operators may talk. What `without_episode` lists has no call on an episode.
+/// episodes whose operators may talk. The tools in `without_episode` have no call on an episode.
 macro_rules! tools {
     (
         without_episode { $($free:ident,)* }
@@ -37,15 +35,15 @@ macro_rules! tools {
             $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
         )*
     ) => {
-        /// Returns the tools of every policy that a language model is offered, in the order it meets them,
-        /// in the texts that it reads.
+        /// Returns the tools that every language model is offered, in their order, with the texts that it
+        /// reads.
         pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
             let specs = operator_tool_specs(wording).into_iter();
             specs.filter(|spec| !spec.for_operators).collect()
         }
 
-        /// Returns the tools of an operator who may talk: those of every policy, and those for talking.
+        /// Returns the tools of an operator that may talk: those of every policy, and those for talking.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
             let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_programs);
@@ -101,7 +99,7 @@ macro_rules! tools {
                     }
                 }
 
-                /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+                /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
                 pub fn steps(&self) -> u32 {
                     match self {
                         $( $call::$tool(args) => args.steps(), )*
@@ -112,7 +110,7 @@ macro_rules! tools {
             tools!(@replies $whose $reply $call { $($tool)* });
         )*
 
-        /// A call on an episode, read and checked as far as that needs no world. It serialises to its
+        /// A call on an episode, parsed, and checked as far as possible without a world. It serialises to its
         /// arguments.
         #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(untagged)]
@@ -137,12 +135,12 @@ macro_rules! tools {
         )* )*
 
         impl ToolCall {
-            /// Returns one call of every tool that every check of the contract accepts.
+            /// Returns a valid call of every tool.
             pub fn examples() -> Vec<ToolCall> {
                 vec![$( $( $tool::example().into(), )* )*]
             }
 
-            /// Reads the call of tool `name` with arguments `args`, without `episode_id`.
+            /// Parses the call of tool `name` with arguments `args`, without `episode_id`.
             pub fn parse(name: &str, args: Value) -> Result<ToolCall, SpecError> {
                 match name {
                     $( $( $tool::NAME => parse_args::<$tool>(args).map(ToolCall::from), )* )*
@@ -169,7 +167,7 @@ macro_rules! tools {
                 }
             }
 
-            /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+            /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
             pub fn steps(&self) -> u32 {
                 match self {
                     $( ToolCall::$group(call) => call.steps(), )*
@@ -224,7 +222,7 @@ tools! {
         StartEpisode,
     }
 
-    /// Asks how things are. Changes nothing and costs no steps.
+    /// A question about the state of things. It changes nothing and costs no steps.
     Look(LookCall) -> each LookReply {
         Observe,
         GetRobotState,
@@ -247,13 +245,13 @@ tools! {
         WalkTo,
     }
 
-    /// Concerns the episode as a whole, and is answered after its end too.
+    /// A call about the episode as a whole, which is answered after its end, too.
     Manage(ManageCall) -> each ManageReply {
         GetStatus,
         Finish,
     }
 
-    /// Words from one operator to the others.
+    /// A message from one operator to the others.
     Talk(TalkCall) -> each TalkReply for operators {
         Say,
     }

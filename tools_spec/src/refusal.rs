@@ -1,5 +1,4 @@
-//! Refusals as callers read them, whatever protocol carries them, and their form over HTTP: RFC 9457 problem
-//! details.
+//! Refusals as callers read them over any protocol, and their form over HTTP: RFC 9457 problem details.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,21 +24,21 @@ pub struct Refusal {
 pub enum RefusalClass {
     /// The request names something that does not exist.
     NotFound,
-    /// The request can be read and says something that can never work.
+    /// The request can be read, but can never work.
     Invalid,
     /// The request does not fit the present state.
     Conflict,
     /// The caller may not do this.
     Forbidden,
-    /// The request names something that exists no longer.
+    /// The request names an object that no longer exists.
     Gone,
-    /// Another server has what the request names.
+    /// Another server has the object of the request.
     Elsewhere,
     /// The caller asks for more than there is room for.
     TooMany,
     /// The server takes no requests of this kind at present.
     Unavailable,
-    /// The simulator failed, and the caller has to know it.
+    /// The simulator failed, which the caller has to know.
     Failed,
     /// A fault of the server, whose text is for its log only.
     Internal,
@@ -49,7 +48,7 @@ impl Refusal {
     /// A fault of the server.
     pub const INTERNAL: Refusal = Refusal::new("internal", "Internal error", RefusalClass::Internal);
 
-    /// Returns a refusal that stands, and whose error's text says what would work.
+    /// Returns a permanent refusal. The error's text says which call would work.
     pub const fn new(kind: &'static str, title: &'static str, class: RefusalClass) -> Refusal {
         Refusal { kind, title, class, retry_after_s: None, hint: None }
     }

@@ -9,7 +9,7 @@ use serde_json::{Error, Value};
 /// The largest integer below which a double names every integer.
 const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// Arguments on their way into a type.
+/// Arguments to be deserialised into a type.
 pub struct StrictValue(pub Value);
 
 impl<'de> IntoDeserializer<'de, Error> for StrictValue {

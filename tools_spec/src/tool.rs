@@ -23,8 +23,8 @@ impl Route {
     }
 }
 
-/// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart
-/// from it, for policies with full assistance.
+/// The arguments of one tool. The type's doc comment is the tool's description; hints on grasping are
+/// separate from it, for policies with full assistance.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Type of its reply.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
@@ -42,7 +42,7 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// True if it is for programs: language models are not offered it.
     const FOR_PROGRAMS: bool = false;
 
-    /// Arguments that work, shown to callers whose own did not.
+    /// Returns valid arguments, shown to callers after a refusal.
     fn example() -> Self;
 
     /// Returns the robots that the arguments name, each as often as they name it.
@@ -60,8 +60,8 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
         Route::of_episode("{episode_id}", Self::NAME)
     }
 
-    /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text
-    /// says what would work.
+    /// Checks properties that need no world: lengths, finite numbers, quaternions that have a direction. The
+    /// text says which values would work.
     fn validate(&self) -> Result<(), String> {
         Ok(())
     }
@@ -74,7 +74,7 @@ pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
     Ok(parsed)
 }
 
-/// Reads what refusals call `name`, and of which `example` is one.
+/// Parses a value that refusals call `name`; `example` is a valid one.
 pub fn read_as<T: DeserializeOwned>(
     name: &'static str,
     value: Value,
@@ -91,7 +91,8 @@ pub fn read_as<T: DeserializeOwned>(
     })
 }
 
-/// Fields that may be null may be left out, and not every face of the contract has null.
+/// Removes the fields that are null. Nullable fields are optional, and not every form of the contract has
+/// null.
 fn without_nulls(value: Value) -> Value {
     match value {
         Value::Array(items) => items.into_iter().map(without_nulls).collect(),

@@ -1,5 +1,5 @@
-//! Evaluation: many episodes that policies play, their results as reports, and the tools around tasks and
-//! training. A session and its recording know nothing of this crate.
+//! Evaluation: many episodes that policies play, reports of the results, and tools for tasks and training.
+//! Sessions and recordings do not depend on this crate.
 
 pub mod batch;
 pub mod evaluation;

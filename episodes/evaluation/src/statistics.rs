@@ -5,7 +5,7 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 
 /// Half of the probability outside an interval of 95 %.
 const TAIL: f64 = 0.025;
-/// Quantile of the normal distribution with that probability above it.
+/// Quantile of the normal distribution that is exceeded with that probability.
 const Z: f64 = 1.959_963_984_540_054;
 
 /// Number of successes among trials.

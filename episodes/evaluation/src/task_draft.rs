@@ -1,5 +1,4 @@
-//! A task to start from, for a scene that someone already has: its movable bodies, a place for two robots, and
-//! a first phase.
+//! Draft of a task in an existing scene: its movable bodies, a place for two robots, and a first phase.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -13,13 +12,13 @@ use tandem_sim::{
 
 /// Length of a trial. It is longer than any fall from a table.
 const TRIAL_STEPS: u32 = 100;
-/// Length of a trial of a robot's place: bodies that begin within each other part at once.
+/// Duration of a trial of a robot's place. Overlapping bodies separate within this time.
 const PLACE_STEPS: u32 = 15;
-/// Distance within which something counts as staying in place.
+/// Distance within which an object counts as staying in place.
 const STAYS_M: f32 = 0.03;
 /// Height below which robots stand on the floor.
 const FEET_M: f32 = 0.08;
-/// Greatest mass of a body that robots are asked to lift.
+/// Maximum mass of a body that robots are asked to lift.
 const MAX_LIFTED_KG: f32 = 4.0;
 /// Distances and headings from a body at which a robot is tried, and its least distance from the other.
 const DISTANCES_M: [f32; 5] = [0.4, 0.5, 0.65, 0.85, 1.1];
@@ -48,7 +47,7 @@ pub enum TaskDraftError {
     NothingMoves { scene: String, have: String },
 }
 
-/// A body of the scene as the draft tells it.
+/// A body of the scene as the draft describes it.
 struct Listed {
     name: String,
     kind: String,
@@ -64,7 +63,7 @@ struct Listed {
 ///
 /// # Errors
 ///
-/// Returns an error if the scene cannot be read or simulated, or if nothing in it can be moved.
+/// Returns an error if the scene cannot be read or simulated, or if it has no movable object.
 pub fn draft_task(scene: &Path, scene_name: &str, id: &str) -> Result<TaskDraft, TaskDraftError> {
     let document = Arc::new(Document::read(scene)?);
     let bodies = listed(&document)?;
@@ -104,7 +103,7 @@ fn listed(document: &Arc<Document>) -> Result<Vec<Listed>, SimError> {
     for body in document.scene_bodies()? {
         let name = body.link.name.clone();
         let file = ObjectFile::OfScene { scene: document.clone(), body: name.clone() };
-        // A body without a name of its own cannot be asked for.
+        // A body without a name cannot be selected.
         let Ok(parts) = ObjectModel::parts(&file, &name) else { continue };
         let Some(part) = parts.first() else { continue };
         let reach_m = |direction| part.model.reach_m(&body.scene_from_body, direction);
@@ -220,7 +219,7 @@ fn tried(name: &'static str, around_m: Vector) -> impl Iterator<Item = RobotPlac
     })
 }
 
-/// Returns true if the last of these robots stands and touches nothing but the floor.
+/// Returns true if the last of these robots stands and touches only the floor.
 fn stands(
     document: &Arc<Document>,
     model: &Arc<RobotModel>,

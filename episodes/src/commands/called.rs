@@ -28,7 +28,7 @@ pub enum Called {
 pub struct OperatorCall {
     robot: String,
     call: Call,
-    /// Tool of the command of a plan to which it belongs. The plan has been counted as a request already.
+    /// Tool of the plan's command to which the call belongs. The plan has been counted as a request already.
     planned: Option<&'static str>,
 }
 
@@ -314,7 +314,7 @@ impl OperatorCall {
 }
 
 impl OperatorCommand {
-    /// Sets what its operator has used up to now.
+    /// Sets the amounts that its operator has used up to now.
     pub fn with_use(self, used: OperatorUse) -> OperatorCommand {
         OperatorCommand { used: Some(used), ..self }
     }

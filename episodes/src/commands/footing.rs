@@ -11,8 +11,8 @@ use crate::convert::{coarse, isometry_from_sim};
 /// Control steps in which a robot stops after a stop command, measured from 0.05 to 0.4 m/s in every
 /// direction. A robot that steps later has been pushed.
 const SETTLES_STEPS: u32 = 75;
-/// Maximum duration of a motion whose end is speed times time, and limit on how far the base may lag
-/// behind that place.
+/// Maximum duration of a motion whose displacement is computed as speed times time, and maximum lag of the
+/// base behind that place.
 const SHORT_STEPS: u32 = 125;
 const LEASH_M: f64 = 0.25;
 /// Parameters of the coasting distance after longer walks, which grows with the speed:

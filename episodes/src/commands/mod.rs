@@ -1,7 +1,7 @@
 //! Commands: an acting tool call is converted to orders for robots once, and each order to a trajectory
 //! of joint targets.
 //!
-//! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`,
+//! Each acting tool has a separate file that converts its arguments to joint targets: `move_wrists`, `walk`,
 //! `send_joint_chunk`, `send_joint_drives`, `wait`.
 
 mod aim;
@@ -86,8 +86,8 @@ impl RobotAction {
         }
     }
 
-    /// Returns true if the robot's drives and base controller carry it out, false for setpoints of its
-    /// motors, and for waiting, which changes nothing.
+    /// Returns true if the robot's drives and base controller execute the command. Returns false for
+    /// setpoints of its motors, and for waiting, which changes no target.
     fn is_for_controller(&self) -> bool {
         match self {
             RobotAction::MoveWrists(_) | RobotAction::Walk(_) | RobotAction::SendJointChunk(_) => true,

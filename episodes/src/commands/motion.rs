@@ -19,14 +19,15 @@ use crate::convert::isometry_from_sim;
 
 /// Fraction of the remaining error removed in one control step: smooth, with a lag of two steps.
 const GAIN: f64 = 0.5;
-/// Control steps in which wrists get as close to their targets as they can.
+/// Number of control steps after which wrists are as close to their targets as they can get.
 const GOING_STEPS: u32 = 75;
-/// Limits of yielding. Hands creep back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S` else.
+/// Limits of yielding. Hands creep back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S`
+/// otherwise.
 const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
-/// Length in metres that counts as much as a radian in the distance to a wrist's target.
+/// Length in metres that counts like a radian in the distance to a wrist's target.
 const M_PER_RAD: f64 = 0.1;
 /// Weight of one control step in the running mean of the distance.
 const LATELY_PART: f64 = 0.1;
@@ -43,7 +44,7 @@ pub struct RobotSheet {
     pub model: Arc<RobotModel>,
     /// Limits of the base commands that its controller follows.
     pub base_limits: BaseLimits,
-    /// Pose of the room frame, the first robot's start frame, in its own start frame.
+    /// Pose of the room frame in the first robot's start frame.
     pub start_from_room: Isometry3<f64>,
 }
 
@@ -55,7 +56,7 @@ pub struct Motion {
     state: MotionState,
 }
 
-/// State of a motion: everything that persists between control steps.
+/// State of a motion that persists between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MotionState {
     /// Joint targets of the current control step, in action order.
@@ -87,7 +88,7 @@ pub struct MotionState {
 /// Restrictions on arms that move to their aims.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Restraint {
-    /// True to keep the waist's joints.
+    /// True to hold the waist's joint angles.
     pub keeps_waist: bool,
     /// True to stop before the robot has to step.
     pub stands_fast: bool,
@@ -305,7 +306,7 @@ impl Motion {
         })
     }
 
-    /// Begins a command with a report of its own.
+    /// Begins a command that has a separate report.
     pub fn begin_command(&mut self) {
         self.state.footing.begin();
     }
@@ -347,12 +348,12 @@ impl Motion {
         !self.state.setpoints.is_empty()
     }
 
-    /// Hands a robot whose motors are driven back to its controller, in the posture in which it is.
+    /// Returns a robot with driven motors to its controller, in its present posture.
     pub(super) fn hand_back(&mut self) {
         self.state.setpoints.clear();
     }
 
-    /// Sets the targets under which the robot would stay as it is.
+    /// Sets the targets that keep the robot in its present posture and place.
     fn stay_where(&mut self, sensed: &RobotSensed) {
         let joint_rad = |column: usize| {
             let joint = &self.robot.model.joints[UPPER[column]];
@@ -437,12 +438,13 @@ impl Motion {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }
 
-    /// Returns the tolerance within which a wrist has arrived at its target.
+    /// Returns the tolerance within which a wrist has reached its target.
     pub fn tolerance(&self, side: Side) -> Tolerance {
         self.body.tolerance(side)
     }
 
-    /// Predicts the rest poses for `targets` (pelvis frame); an arm without a target keeps its joints.
+    /// Predicts the rest poses for `targets` (pelvis frame). The joints of an arm without a target do not
+    /// move.
     pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
         let speeds_rad_s = self.body.speeds_rad_s(targets, keeps_waist);
         let tasks = self.body.tasks(targets, 1.0);

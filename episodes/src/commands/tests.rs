@@ -129,7 +129,8 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
         assert!(off_m(&motion).norm() < 1e-3, "{} under {hands_n}", off_m(&motion));
         play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     }
-    // 10 N for a second, at 1 m/s for 250 N: 4 cm, minus the creep back and the hand's lag.
+    // A force of 10 N acts for one second, with a compliance of 1 m/s per 250 N. The hand yields by 4 cm,
+    // minus the creep back and the hand's lag.
     let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), ahead_n, &mut motion);
     assert!((0.036..0.040).contains(&off_m(&motion).x), "{}", off_m(&motion));
@@ -142,8 +143,8 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
-/// A hand with a new orientation and no position is to stay at its earlier target. Pulled continually, it
-/// yields by no more than the limit of one command.
+/// A hand with a new orientation and no position is to stay at its earlier target. A continual pull moves it
+/// by no more than the limit of one command.
 #[test]
 fn targets_that_are_left_out_do_not_go_on_from_where_hands_have_given_way_to() {
     let mut motion = arrived();
@@ -185,8 +186,8 @@ fn wrists_in_world(motion: &Motion) -> Sides<Isometry3<f64>> {
     motion.wrists().map(|wrist| motion.world_from_pelvis() * wrist.commanded)
 }
 
-/// 10 N or 2 N m for a second, at 1 m/s for 250 N and 1 rad/s for 20 N m: 4 cm and 0.1 rad, minus the
-/// creep back and the hands' lag.
+/// 10 N and 2 N m act for one second, with compliances of 1 m/s per 250 N and 1 rad/s per 20 N m. The hands
+/// yield by 4 cm and 0.1 rad, minus the creep back and the hands' lag.
 #[test]
 fn the_pair_of_hands_gives_way_to_the_side_and_about_the_vertical() {
     // The robot faces along the world's y axis, so -x is its left, and its left hand is the one at -x.

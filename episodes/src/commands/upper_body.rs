@@ -204,9 +204,9 @@ fn g1_capsules(model: &Model) -> Result<Vec<Capsule>, IkError> {
     Ok(capsules)
 }
 
-/// Returns the capsules of a robot whose file names its links differently, from the places of its joints.
-/// They are a trunk below the shoulders and as wide, a head around the camera, and a forearm and a hand
-/// of each arm. The forearm extends to the link of the wrist, and the hand from there to the palm. Their
+/// Returns the capsules of a robot whose file has other names for its links, from the places of its joints.
+/// They are a trunk below the shoulders and as wide, a head around the camera, and a forearm and a hand of
+/// each arm. The forearm extends to the link of the wrist, and the hand from there to the palm. Their
 /// thickness is that of a G1, scaled to this robot.
 fn capsules(model: &Model, robot: &RobotModel) -> Result<Vec<Capsule>, IkError> {
     let poses = robot.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);

@@ -67,8 +67,8 @@ impl WalkTrajectory {
 }
 
 /// Returns the waist pitch that brings a point in the pelvis frame near the middle of the image, once the
-/// waist has turned to it. It is the pitch closest to `present_rad`. The camera's pitch follows the
-/// trunk's; the camera's displacement is neglected.
+/// waist has turned towards the point. It is the pitch closest to `present_rad`. The camera's pitch follows
+/// the trunk's; the camera's displacement is neglected.
 fn bend_to_see(model: &RobotModel, point_m: [f64; 3], present_rad: f64) -> f64 {
     let links = model.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
     let upright = links[model.egocentric_link] * model.egocentric.body_from_camera;

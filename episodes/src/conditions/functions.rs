@@ -28,7 +28,7 @@ pub enum Parameter {
     Side,
     /// Name of an object.
     Object,
-    /// Name of an object, or of a part of one, whose joint is of this kind.
+    /// Name of an object, or of an object's part, whose joint is of this kind.
     Opening(OpeningKind),
     /// Name of a site on the object at argument `of`.
     Site {

@@ -47,7 +47,7 @@ pub fn stands_released(f: &Facts, object: &str) -> Vec<String> {
     found
 }
 
-/// Returns how much higher or lower an object is than at the start.
+/// Returns the change of an object's height since the start.
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> Vec<String> {
     let lift_m = f.lift_m(object);
     let (by_m, way) = (lift_m.abs(), if lift_m > 0.0 { "higher" } else { "lower" });

@@ -137,7 +137,7 @@ const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up t
 /// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange messages.
 pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
     let waiting = if assistance == Assistance::Full { WAITING } else { "" };
-    // Without messages there is nothing to hear.
+    // Robots without messages never receive a text.
     let waiting = if may_talk { waiting.into() } else { waiting.replace("{\"heard\": true}, ", "") };
     let sharing = if assistance == Assistance::Full { ": best in frame \"room\"." } else { "." };
     let talking = if may_talk { [TALKING, sharing].concat() } else { String::new() };

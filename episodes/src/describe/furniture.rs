@@ -1,4 +1,4 @@
-//! Description of the furniture: what stands fixed near the robots and the task's objects.
+//! Description of the furniture: fixed geoms near the robots and the task's objects.
 
 use tandem_sim::mjcf::Geom;
 use tandem_sim::{Pose, Rotation, Vector};
@@ -9,7 +9,7 @@ use crate::tasks::Task;
 
 /// Maximum horizontal distance of furniture from a robot's start position or from an object of the task.
 const MAX_DISTANCE_M: f32 = 1.0;
-/// Minimum height of a top, and maximum height of a lower side, of what is in the way of hands or feet.
+/// Minimum height of the top, and maximum height of the underside, of a piece that obstructs hands or feet.
 const MIN_TOP_M: f32 = 0.1;
 const MAX_BOTTOM_M: f32 = 1.6;
 /// Maximum gap between a support and the piece that hides it.

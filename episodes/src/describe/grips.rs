@@ -1,5 +1,6 @@
-//! Worked grips, one for each kind of object in the tasks, as policies are given them. They are the experts'
-//! own; a test in this crate compares them. Another test has a robot perform each by this information alone.
+//! Example grips for each kind of object in the tasks, as policies receive them. They equal the experts'
+//! grips, which a test in this crate compares. In another test a robot performs each grip from this
+//! information alone.
 
 use tandem_tools_spec::WorkedGrip;
 

@@ -93,7 +93,7 @@ pub fn instructions(task: &Task, words: &TaskWords) -> Vec<Instruction> {
     task.robot_names().zip(&words.robots).map(part).collect()
 }
 
-/// Returns the description of a kind of robot, of which `robot` is an example.
+/// Returns the description of a kind of robot, by the example `robot`.
 pub fn robot_kind(kind: String, robot: &RobotSheet) -> RobotKind {
     RobotKind {
         kind,

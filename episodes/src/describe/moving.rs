@@ -9,7 +9,7 @@ use crate::tasks::{ObjectSpot, RobotSpot, told_name};
 
 /// Minimum travel of a part's far end.
 const MIN_TRAVEL_M: f32 = 0.05;
-/// Points whose travel is this near to the largest one are the far end.
+/// Maximum difference from the largest travel at which points count as the far end.
 const SAME_TRAVEL_M: f32 = 0.01;
 
 /// Returns one line for each part that moves on an object within a range, for example "lever door leaf, 0.11 m

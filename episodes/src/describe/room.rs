@@ -10,9 +10,9 @@ use super::moving::moving;
 use super::relative::{places, seen_from};
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task, told_name};
 
-/// Solids that end this near the top of an object belong to its top.
+/// Solids that end within this distance of an object's top belong to the top.
 const NECKS_TOP_M: f32 = 0.01;
-/// Greatest difference between the two widths of what is round.
+/// Maximum difference between the two widths of a round object.
 const ROUND_M: f32 = 0.005;
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
@@ -74,8 +74,8 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-/// Returns the middle of an object: its origin, and that of its extent for a body of a scene, whose origin may
-/// be anywhere.
+/// Returns the middle of an object, which is its origin. For a body of a scene it is the middle of the
+/// extent, because the origin may be anywhere.
 fn middle_m(spot: &ObjectSpot, parts: &[ObjectPart]) -> [f32; 2] {
     let [x_m, y_m, _] = spot.position_m;
     let [low_m, high_m] = visible_m(parts, spot.yaw_rad);

@@ -1,6 +1,7 @@
 //! HTML pages: their common frame, and the escaping of text.
 
-/// Style of every page, in light and in dark, from a phone's width on. It loads nothing.
+/// Style of all pages, for light and dark modes and for screens from a phone's width. It loads no other
+/// files.
 const STYLE: &str = include_str!("page.css");
 
 /// Returns a self-contained page: no script, no font, no image from elsewhere. `title` is text, `body` is
@@ -53,7 +54,7 @@ mod tests {
         assert!(page("a<b>", "").contains("<title>a&lt;b&gt;</title>"));
     }
 
-    /// At 400 pixels, which are 25 rem, nothing may be wider than the page unless it scrolls on its own.
+    /// On a screen of 400 pixels, which are 25 rem, no element may be wider than the page unless it scrolls.
     #[test]
     fn nothing_has_a_width_that_a_telephone_has_not() {
         let narrow_rem = 25.0;

@@ -46,7 +46,7 @@ pub enum LiveEvent {
     /// A tool call with its reply, or a note.
     Entry(Arc<LiveEntry>),
     Phase(PhaseReached),
-    /// The next phase, and what it lacks.
+    /// The next phase, and its missing conditions.
     NextPhase(Arc<NextPhase>),
     /// The result. The episode takes no more commands.
     Ended(Arc<ResultReply>),

@@ -101,7 +101,7 @@ impl LiveScene {
 
     /// Returns the message of a step; `frame.rs` describes its format.
     pub fn frame(&self, live: &LiveStep) -> Vec<u8> {
-        // Every frame begins with the states of its own step, so a panic leaves no stale state behind.
+        // Every frame begins with the states of the present step, so a panic leaves no stale state behind.
         let mut motions = self.motions.lock().unwrap_or_else(PoisonError::into_inner);
         frame::row(live, &mut motions, &self.robots)
     }

@@ -26,7 +26,7 @@ pub struct ImageFile {
     pub bytes: Vec<u8>,
 }
 
-/// Images of a scene, each once.
+/// Distinct images of a scene.
 #[derive(Default)]
 pub(super) struct SceneTextures {
     pub found: Vec<Arc<LiveTexture>>,
@@ -90,7 +90,7 @@ impl SceneTextures {
         number
     }
 
-    /// Returns what pages have to know of the images before they have them.
+    /// Returns the data about the images that pages need before the images are loaded.
     pub fn told(&self) -> Value {
         let told = |LiveTexture { hash, texture }: &LiveTexture| {
             json!({

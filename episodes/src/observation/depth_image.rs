@@ -6,10 +6,10 @@ use tandem_tools_spec::{DepthImage, Png};
 use super::RobotView;
 use crate::convert::coarse;
 
-/// Fraction of the pixels that may be nearer than white: a hand before the camera would leave little contrast
-/// to the rest.
+/// Fraction of the pixels that may be nearer than white. Without it, a hand before the camera would leave
+/// little contrast for the other pixels.
 const NEARER_PART: f64 = 0.1;
-/// Depth that is black if everything is at one depth, relative to it.
+/// Depth drawn in black if the whole image is at one depth, relative to that depth.
 const SINGLE_DEPTH_FACTOR: f64 = 2.0;
 
 /// Returns the depth of a view as a grey image. Brightness is linear in 1 / depth.

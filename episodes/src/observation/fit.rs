@@ -8,11 +8,10 @@ use tandem_tools_spec::{EdgeFit, PlaneFit, RegionFit};
 use super::RobotView;
 use crate::convert::coarse;
 
-/// Maximum distance of a plane's points from it, and the same as a fraction of their distance from the
-/// camera.
+/// Maximum distance of points from their plane, and the same as a fraction of their distance from the camera.
 const PLANE_OFF_M: f64 = 0.003;
 const PLANE_OFF_SHARE: f64 = 0.003;
-/// Maximum distance of an edge's points from it.
+/// Maximum distance of points from their edge.
 const EDGE_OFF_M: f64 = 0.004;
 const TRIALS: usize = 200;
 /// Minimum number of points on a plane, and their minimum fraction of the points in the region.
@@ -21,7 +20,7 @@ const MIN_PLANE_SHARE: f64 = 0.2;
 const MIN_EDGE_POINTS: usize = 12;
 const MIN_EDGE_M: f64 = 0.03;
 const MAX_EDGES: usize = 4;
-/// Minimum angle between edges that meet at a corner, and maximum distance of their ends from it.
+/// Minimum angle between edges that meet at a corner, and maximum distance between their ends and the corner.
 const MIN_CORNER_RAD: f64 = 0.35;
 const MAX_CORNER_GAP_M: f64 = 0.03;
 
@@ -166,7 +165,7 @@ impl Plane {
     }
 }
 
-/// Returns the plane with the most of these points, their root mean square distance from it, and their
+/// Returns the plane with the most of these points, the root mean square of their distances, and their
 /// number.
 fn fit_plane(points_m: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
     if points_m.len() < MIN_PLANE_POINTS {

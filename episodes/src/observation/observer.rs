@@ -38,7 +38,7 @@ pub struct Observer {
 struct NamedObject {
     /// Name in the description of the room. That of a part begins with the object's.
     name: String,
-    /// Name of the task's object that it belongs to; its own, if it is one.
+    /// Name of the task's object: the object itself, or the one that the part belongs to.
     owner: String,
     /// Id in [`Frame::ids`].
     id: u32,
@@ -48,7 +48,7 @@ struct NamedObject {
 struct DrawnStep {
     /// Held so that its address stays unique.
     step: Arc<Step>,
-    /// CameraView of each robot, once rendered.
+    /// View of each robot's camera, once it is rendered.
     views: Vec<Option<Arc<RobotView>>>,
 }
 
@@ -134,8 +134,8 @@ impl Observer {
         scaled_colours(self.colours(step, &view), [width, height], size_px)
     }
 
-    /// Returns true if [`Observer::eyes`] is the faster way to render several worlds, and possible: only ideal
-    /// images are rendered together.
+    /// Returns true if [`Observer::eyes`] can render several worlds and is faster. Only ideal images are
+    /// rendered together.
     pub fn draws_together(&self) -> bool {
         self.cameras.are_ideal() && self.renderer.draws_together()
     }
@@ -305,7 +305,7 @@ impl Observer {
         Ok(DepthReply { surfaces, ..no_depth(name, frame) })
     }
 
-    /// Returns true if a pixel of a view may see something, of which the camera has no depth.
+    /// Returns true if a pixel may show something although it has no depth.
     fn is_hole(&self, view: &RobotView, [u, v]: [i64; 2]) -> bool {
         let pixel = v as usize * view.picture.width as usize + u as usize;
         !self.cameras.are_ideal() && !view.depth_m[pixel].is_finite()
@@ -326,7 +326,7 @@ impl Observer {
     fn object_ids(&self, name: &str) -> Result<BTreeSet<u32>, EpisodeError> {
         let asked = told_name(name);
         let part = format!("{asked} ");
-        // An object of its own may have a longer name: a basket and a basket patch.
+        // A separate object may have a longer name: a basket and a basket patch.
         let is_it = |object: &&NamedObject| {
             object.name == asked || object.name.starts_with(&part) && !object.owner.starts_with(&part)
         };

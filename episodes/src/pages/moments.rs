@@ -22,8 +22,8 @@ pub struct LabelledPicture {
     pub file: Vec<u8>,
 }
 
-/// Renders the moments side by side as far as there is room, each with its texts and its images, which are
-/// embedded in the page.
+/// Renders as many moments side by side as fit, each with its texts and images. The images are embedded in
+/// the page.
 pub fn html(moments: &[KeyMoment], class: &str) -> String {
     let mut figures = String::new();
     for KeyMoment { caption: [what, when], views } in moments {

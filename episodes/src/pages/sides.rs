@@ -27,7 +27,7 @@ const MIN_RADIUS_M: f32 = 0.05;
 ///
 /// # Errors
 ///
-/// The scene cannot be read or drawn. The text lists everything in the file that is refused.
+/// The scene cannot be read or drawn. The text lists all refused parts of the file.
 pub fn draw_sides(scene: &Path) -> Result<Vec<u8>, EpisodeError> {
     let world = World::of_scene(Document::read(scene)?)?;
     let (step, mut renderer) = (world.present(), RendererKind::Cpu.renderer(Scenery::of(&world)));
@@ -53,7 +53,7 @@ pub fn draw_sides(scene: &Path) -> Result<Vec<u8>, EpisodeError> {
     Ok(encode_png(2 * width, 2 * height, all.as_raw())?)
 }
 
-/// Returns centre and radius of a sphere around everything but planes.
+/// Returns centre and radius of a sphere around all geoms except planes.
 fn sphere(world: &World) -> (Vector, f32) {
     let of_room = world.room().iter().flat_map(|geom| corners_m(geom, &Pose::IDENTITY));
     let step = world.present();

@@ -249,7 +249,7 @@ mod tests {
                 assert!(near, "{middle:?} for {colour:?}");
             }
         }
-        // An image without texts is shown as it is.
+        // An image without texts is shown unchanged.
         RgbImage::new(80, 40).save(&path).unwrap();
         let moments = read(&path, 0.25).unwrap();
         assert_eq!((moments.len(), moments[0].views.len(), &*moments[0].caption[0]), (1, 1, ""));

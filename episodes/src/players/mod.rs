@@ -30,8 +30,8 @@ pub trait PrivilegedEpisode: Episode {
 
 /// An episode in the caller's own process, which shows images as rendered.
 pub trait LocalEpisode: Episode {
-    /// Returns what a call of `observe` shows, as rendered, with nothing withheld. `shown` is the extra
-    /// information that the policy receives beyond the benchmark's own policies.
+    /// Returns the image, depth and readings that a call of `observe` shows, rendered and complete. `shown`
+    /// is the extra information that the policy receives beyond the benchmark's own policies.
     fn observe(
         &mut self,
         observe: &Observe,

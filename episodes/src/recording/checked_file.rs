@@ -1,4 +1,4 @@
-//! A whole recording in memory, every byte of which has been checked.
+//! A whole recording in memory with all checksums verified.
 //!
 //! | bytes | checked against |
 //! |---|---|
@@ -21,10 +21,9 @@ const FOOTER_BYTES: usize = 2 * size_of::<u64>() + size_of::<u32>();
 /// Opcode and length, with which a footer begins.
 const FOOTER_RECORD: [u8; 9] = [op::FOOTER, FOOTER_BYTES as u8, 0, 0, 0, 0, 0, 0, 0];
 
-/// Largest size of one topic's messages that are read. The requests and replies of a long episode take a
-/// tenth of that.
+/// Maximum size of one topic's messages. The requests and replies of a long episode take a tenth of that.
 const MAX_TOPIC_BYTES: usize = 1 << 30;
-/// Largest number of channels in a file. Tandem's recordings have less than a hundred.
+/// Maximum number of channels in a file. Tandem's recordings have fewer than a hundred.
 const MAX_CHANNELS: usize = 4096;
 
 /// The texts of a metadata record.

@@ -23,9 +23,9 @@ const LZ4_MOST_EXPANSION: u64 = 255;
 /// repeated.
 const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
-/// Largest size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
+/// Maximum size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
 const MAX_CHUNK_BYTES: u64 = 256 << 20;
-/// Largest size of all chunks together, decompressed.
+/// Maximum size of all chunks together, decompressed.
 const MAX_RECORDS_BYTES: u64 = 16 << 30;
 
 /// Prefix of the library name in the header of every recording by Tandem, followed by a version. These
@@ -247,7 +247,7 @@ impl<'a> DataSection<'a> {
         Ok(AttachmentPlace { log_time, create_time, name, media_type, data })
     }
 
-    /// Compares a message index with the chunk before it, about which it has no further information.
+    /// Compares a message index with the chunk before it. An index has no further information.
     fn compare_index(&mut self, content: &[u8]) -> Result<(), Fault> {
         let Record::MessageIndex(index) = parse(op::MESSAGE_INDEX, content)? else {
             return Err(Fault::Unexpected);

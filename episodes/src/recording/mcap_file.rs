@@ -29,7 +29,7 @@ pub struct McapFile {
     path: PathBuf,
     /// Buffer that messages share.
     buffer: Vec<u8>,
-    /// The same channels for those who watch.
+    /// The same channels for viewers.
     live: Option<Box<dyn LiveRecording>>,
 }
 
@@ -101,8 +101,8 @@ impl McapFile {
         written.map_err(|e| self.failed(e))
     }
 
-    /// Hands everything that has been written to the system, in whole chunks. It then survives the process
-    /// and can be read.
+    /// Flushes everything written to the system, in whole chunks. The flushed data survives the process and
+    /// can be read.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.writer.flush().map_err(|e| self.failed(e))
     }
@@ -139,7 +139,7 @@ impl McapFile {
     }
 }
 
-/// Viewer of recordings, for example a server. It is told of every recording that begins.
+/// Viewer of recordings, for example a server. It is notified of every new recording.
 pub trait LiveViewer: Debug + Send + Sync {
     /// Returns the view of a recording that begins.
     fn begin(&self) -> Box<dyn LiveRecording>;
@@ -192,8 +192,8 @@ pub enum Visibility {
     /// Readable during the episode, under the name `episode.mcap.partial`.
     #[default]
     Live,
-    /// Readable after the end. Until then nobody sees data that is withheld from policies, and a killed
-    /// process leaves nothing.
+    /// The file is readable after the end. Until then nobody sees data that is withheld from policies, and a
+    /// killed process leaves no file.
     After,
 }
 
@@ -235,7 +235,7 @@ impl RecordingStore {
         &self.pending
     }
 
-    /// Puts everything on the disk under the name `path`.
+    /// Writes all data to the disk under the name `path`.
     pub fn keep(mut self, path: &Path) -> Result<(), OutputError> {
         let failed = |source| OutputError::Io { path: path.into(), source };
         self.flush().map_err(failed)?;
@@ -251,7 +251,7 @@ impl RecordingStore {
 /// then.
 fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
     let partial = partial_path(path);
-    // No lock on systems where it would also keep others from reading.
+    // On systems where a lock would also prevent others from reading, the file is not locked.
     if !cfg!(unix) {
         return Ok((File::create(&partial)?, partial));
     }
@@ -273,7 +273,7 @@ fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
     }
 }
 
-/// Truncates what a failed flush has written. Removes a file that has nothing before it.
+/// Truncates what a failed flush has written. Removes a file that was empty before.
 fn leave(file: &File, partial: &Path, flushed_bytes: u64) {
     // If that fails, too, the readable part of the file is the same.
     let _ = match flushed_bytes {

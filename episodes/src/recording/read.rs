@@ -24,7 +24,7 @@ use crate::result_file::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
 
-/// Largest recording that is read. Those of long episodes with images have several hundred megabytes.
+/// Maximum size of a recording. Those of long episodes with images have several hundred megabytes.
 pub const MAX_RECORDING_BYTES: u64 = 4 << 30;
 
 /// A recording in memory.
@@ -242,7 +242,7 @@ impl Recording {
         self.messages(topics::NOTES).collect()
     }
 
-    /// Returns the setpoints of a robot's motors in every control step in which it was driven by any.
+    /// Returns the setpoints of a robot's motors for every control step in which setpoints drove it.
     ///
     /// # Errors
     ///

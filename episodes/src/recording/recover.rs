@@ -19,10 +19,10 @@ pub struct Recovered {
     pub messages: u64,
     /// Simulated time of the last message.
     pub last_s: f64,
-    /// `None` if nothing was left out.
+    /// `None` if everything was recovered.
     pub left_out: Option<LeftOut>,
-    /// Number of metadata records that no checksum covers, for example those of earlier versions. They are
-    /// taken as they are.
+    /// Number of metadata records without a checksum, for example those of earlier versions. They are copied
+    /// unchanged.
     pub unchecked_metadata: usize,
 }
 
@@ -34,7 +34,7 @@ pub struct LeftOut {
     pub bytes: usize,
 }
 
-/// Reason why nothing was recovered.
+/// Reason why the recovery failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RecoverError {
     #[error("{} does not end in .partial; what does not is complete, or is no recording", .0.display())]
@@ -63,7 +63,7 @@ impl RecoverError {
 }
 
 /// Writes the messages, attachments and metadata of `FILE.partial` up to the first damaged part to `FILE`,
-/// with an index. The source stays as it is. The result can be replayed, or nothing is written.
+/// with an index. The source is not changed. The result can be replayed, or nothing is written.
 ///
 /// # Errors
 ///
@@ -84,7 +84,7 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let damage = loop {
         match data.next_part() {
             Ok(Some(part)) => copy.add(part, &bytes)?,
-            // The writer creates anew what follows the data.
+            // The writer recreates all records after the data section.
             Ok(None) => break None,
             Err(damage) => break Some(damage),
         }
@@ -112,7 +112,7 @@ struct RecoveredFile {
 
 impl RecoveredFile {
     fn create(path: &Path) -> Result<RecoveredFile, OutputError> {
-        // In memory, so that nothing is left behind if nothing can be recovered.
+        // The recovery works in memory, so that a failure leaves no file behind.
         let store = RecordingStore::create(path, Visibility::After)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
@@ -160,14 +160,14 @@ impl RecoveredFile {
         }
     }
 
-    /// Gives the file its name, if it can be replayed.
+    /// Renames the file to its final name, if it can be replayed.
     fn finish(mut self, partial: &Path) -> Result<PathBuf, RecoverError> {
         self.writer.finish().map_err(|source| OutputError::of_recording(&self.path, source))?;
         let store = self.writer.into_inner();
         Recording::from_bytes(partial, store.pending().to_vec())
             .and_then(|recording| recording.check_replayable())
             .map_err(|source| RecoverError::too_little(partial, source))?;
-        // The partial name is that of the source, so a third one serves meanwhile.
+        // The source has the partial name, so the copy has a third name meanwhile.
         write_whole_as(&partial.with_extension("recovering"), &self.path, store.pending())?;
         Ok(self.path)
     }

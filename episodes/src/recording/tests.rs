@@ -387,7 +387,7 @@ fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
     }
 }
 
-/// The layout that the book has people open in Foxglove only names what recordings contain.
+/// The Foxglove layout in the book names only topics that recordings contain.
 #[test]
 fn the_layout_names_topics_and_fields_that_there_are() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,18 +10,17 @@ use std::{io, iter, mem};
 use super::write::Recorder;
 use crate::output::OutputError;
 
-/// Time within which appends are gathered before they are handed to the system in one go. A killed process
-/// loses about this much. Waking the thread for every step or call would take a core from the client that
-/// waits for the reply.
+/// Time for which appends are collected before one system call writes them. A killed process loses about as
+/// much. Waking the thread for every step or call would take a core from the client that waits for the reply.
 const GATHERED: Duration = Duration::from_millis(250);
 
-/// Largest number of pending appends before the episode waits for the recorder.
+/// Maximum number of pending appends before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
 
 /// Steps that are handed to the system in one go: fewer would make chunks that compress badly.
 const GATHERED_STEPS: usize = 12;
 
-/// Largest number of steps that a killed process loses. At this number, the episode waits until the system
+/// Maximum number of steps that a killed process loses. At this number, the episode waits until the system
 /// has them.
 const UNWRITTEN_STEPS: usize = 25;
 
@@ -38,8 +37,8 @@ type Write = Box<dyn FnOnce(&mut Recorder) -> Result<(), OutputError> + Send>;
 enum Append {
     Step(Write),
     Other(Write),
-    /// Writes out everything before it. The sender is dropped once that is done or has failed; nothing is
-    /// ever sent.
+    /// Writes out everything before this entry. The sender is dropped once that is done or has failed.
+    /// Nothing is ever sent.
     Flush(SyncSender<()>),
 }
 
@@ -48,7 +47,7 @@ pub struct RecorderThread {
     /// `None` once it is stopped.
     appends: Option<SyncSender<Append>>,
     thread: Option<JoinHandle<Option<Recorder>>>,
-    /// The first failure. The recording would have a hole after it, so it ends there.
+    /// The first failure. The recording ends there, because a gap would follow.
     failed: Arc<OnceLock<String>>,
     waiting_pictures: Arc<AtomicUsize>,
     /// Steps that the system does not have yet.
@@ -90,7 +89,7 @@ impl RecorderThread {
         self.catches_up = catches_up;
     }
 
-    /// Appends something after all earlier appends, within a short time.
+    /// Queues an append after all earlier ones. The recorder executes it within a short time.
     pub fn append(&self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static) {
         self.send(Append::Other(Box::new(append)));
     }
@@ -125,7 +124,7 @@ impl RecorderThread {
             sent => sent.is_ok(),
         };
         if !sent {
-            // If it has failed, it has already reported the reason.
+            // A recorder that has failed has already reported the reason.
             self.failed.get_or_init(|| PANICKED.into());
         }
     }
@@ -149,7 +148,7 @@ impl RecorderThread {
         self.keep_up(count, GATHERED_PICTURES, WAITING_PICTURES);
     }
 
-    /// Waits until the system has everything that was appended before, or an append has failed.
+    /// Waits until all earlier appends are written to the system, or one has failed.
     pub fn flush(&self) {
         let (flushed, wait) = sync_channel::<()>(0);
         self.send(Append::Flush(flushed));
@@ -208,7 +207,7 @@ impl Appender {
         while let Ok(first) = inbox.recv() {
             if !matches!(first, Append::Flush(_)) && !self.hurry.swap(false, Ordering::AcqRel) {
                 park_timeout(GATHERED);
-                // The append that caused the wake-up was sent before it, and is taken up now.
+                // The append that caused the wake-up was sent before, and is taken up now.
                 self.hurry.swap(false, Ordering::AcqRel);
             }
             let mut appends = iter::once(first).chain(inbox.try_iter());
@@ -219,7 +218,7 @@ impl Appender {
         Some(self.recorder)
     }
 
-    /// Executes an append. Returns `false` once something has failed.
+    /// Executes an append. Returns `false` after a failure.
     fn append(&mut self, append: Append) -> bool {
         match append {
             Append::Step(write) => {

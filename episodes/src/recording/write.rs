@@ -129,7 +129,7 @@ impl Recorder {
         self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities, deletions: vec![] })
     }
 
-    /// Appends one control step with the scoring's `facts`, and the hash of the whole state after it.
+    /// Appends one control step with the scoring's `facts` and the hash of the whole state after the step.
     /// `executed` are the commands that the robots executed, which may differ from the policy's, and
     /// setpoints of their motors.
     pub fn step(
@@ -189,7 +189,7 @@ impl Recorder {
         self.file.write(&mut self.notes, time_s, &Json(note))
     }
 
-    /// Hands everything that has been appended to the system.
+    /// Writes all appended data to the system.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.file.flush()
     }

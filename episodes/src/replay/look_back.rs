@@ -25,7 +25,7 @@ pub struct RecordedEpisode {
     spec: EpisodeSpec,
     scene: LiveScene,
     steps: Vec<Step>,
-    /// Steps of which a policy was shown images.
+    /// Steps whose images a policy was shown.
     looked: Vec<Step>,
     message: Arc<[u8]>,
 }
@@ -86,8 +86,8 @@ impl RecordedEpisode {
     }
 
     /// Returns the image of robot `name` as a PNG file, in the step nearest to `time_s`. Candidates are the
-    /// displayed steps, and those of which a policy was shown images. Returns `None` if there is no such
-    /// robot or step.
+    /// displayed steps, and those whose images a policy was shown. Returns `None` if there is no such robot
+    /// or step.
     pub fn picture(&self, time_s: f64, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let away = |step: &&Step| (step.time_s - time_s).abs();
         let step =
@@ -108,7 +108,7 @@ fn shown(motions: &[Motion], step: &Step) -> LiveStep {
     LiveStep::new(step.clone().into(), states.collect(), None)
 }
 
-/// Returns the step of which a policy was shown images.
+/// Returns the step whose images a policy was shown.
 fn looked_at(entry: &TranscriptEntry) -> Option<u64> {
     match entry {
         TranscriptEntry::Call { call, .. } => (!call.pictures.is_empty()).then_some(call.control_step),

@@ -32,9 +32,9 @@ pub struct Moment<T> {
 #[derive(Debug)]
 pub struct ConditionTrace {
     pub setting: PhaseSetting,
-    /// Duration for which it has to hold without a break.
+    /// Duration for which the condition has to hold without interruption.
     pub for_s: f64,
-    /// Record of all its parts at once.
+    /// Record of all its parts together.
     pub held: Held,
     pub parts: Vec<PartTrace>,
     /// Largest number of parts that held at once.
@@ -49,11 +49,11 @@ pub struct PartTrace {
     /// The text in that file, with numbers of five digits at most.
     pub text: String,
     pub held: Held,
-    /// Its closest value, if it never held and has a numeric one.
+    /// Closest value of a numeric condition that never held; `None` for others.
     pub nearest: Option<Moment<Closest>>,
 }
 
-/// Measure of how near something came to holding.
+/// Measure of a condition's distance from holding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Closest {
     /// Both sides of a comparison.
@@ -62,10 +62,10 @@ pub enum Closest {
     Share(f32),
 }
 
-/// Record of when something held.
+/// Record of the times at which a condition held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Held {
-    /// Number of steps in which it held; `of` is the number of all steps.
+    /// Number of steps in which the condition held; `of` is the number of all steps.
     pub steps: u32,
     pub of: u32,
     /// Time at which it first held.

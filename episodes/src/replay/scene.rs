@@ -98,9 +98,9 @@ impl EpisodeRenderer {
         }
     }
 
-    /// Returns the image of a camera after `step`, in its own size or in another, without depth. A size of
-    /// the same shape that is no larger gives the camera's own image, scaled. That is what a policy sees
-    /// that requests this size.
+    /// Returns the image of a camera after `step`, in its own size or in another, without depth. A smaller
+    /// image of the same shape is the camera's own image, scaled: a policy that requests this size gets the
+    /// same.
     pub fn colours(&mut self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
         let own = self.view(of, step, None);
         let own_px = [own.camera.width, own.camera.height];

@@ -52,7 +52,7 @@ impl RowContract {
 ///
 /// # Errors
 ///
-/// If rows have no such rate.
+/// If the rate is not one of [`ROW_RATES_HZ`].
 pub fn steps_per_row(rate_hz: u32) -> Result<u32, String> {
     match ROW_RATES_HZ.contains(&rate_hz) {
         true => Ok(ROW_RATES_HZ[0] / rate_hz),

@@ -6,7 +6,7 @@ use tandem_sim::{HandContacts, Side, Sides, Step, Vector};
 
 use super::Grip;
 
-/// Least force of each of two opposed parts of a hand for a hold to begin. A 0.5 kg bottle held at friction
+/// Minimum force of each of two opposed parts of a hand for a hold to begin. A 0.5 kg bottle held at friction
 /// 0.8 needs 3 N from either side, and a resting finger presses with less than 0.5 N.
 pub const HOLD_BEGINS_N: f32 = 1.5;
 /// Force below which a hold ends. It is lower than `HOLD_BEGINS_N`, so that a hand in motion does not

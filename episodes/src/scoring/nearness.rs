@@ -47,7 +47,7 @@ pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
     all(&robots.iter().map(nearer).collect::<Vec<_>>())
 }
 
-/// Returns how near `object` is to standing upright and still with every robot off it.
+/// Returns a measure of how close `object` is to standing upright and still, with no robot touching it.
 pub fn standing(f: &Facts, object: &str) -> f32 {
     let is_still = f.speed_m_s(object) <= STILL_M_S && f.turn_rate_rad_s(object) <= STILL_RAD_S;
     let released = f.untouched_s(object) >= RELEASE_S;

@@ -4,11 +4,11 @@ use crate::scoring::Facts;
 
 /// Time without touch by any part of a robot after which an object counts as released.
 pub const RELEASE_S: f64 = 0.2;
-/// Largest tilt of a placed object.
+/// Maximum tilt of a placed object.
 pub const UPRIGHT_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
-/// Largest speed of a placed object.
+/// Maximum speed of a placed object.
 pub const STILL_M_S: f32 = 0.05;
-/// Largest angular speed of a placed object.
+/// Maximum angular speed of a placed object.
 pub const STILL_RAD_S: f32 = 0.15;
 
 /// Returns `true` if no robot has touched `object` for 0.2 s, and it is upright and still.

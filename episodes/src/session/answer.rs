@@ -163,7 +163,7 @@ impl Session {
         Ok(seen)
     }
 
-    /// Checks that an observation is valid and shows nothing that is withheld.
+    /// Checks that an observation is valid and requests no withheld data.
     pub(super) fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
         self.check_told(&look.observe.clone().into())?;
         self.looked_through(&look.observe, &look.formats).map(drop)

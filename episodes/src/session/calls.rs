@@ -124,10 +124,10 @@ fn unanswered(tool: &'static str, reason: &str) -> EpisodeError {
 }
 
 impl Session {
-    /// Performs a request and returns the answer in the form for its audience. A refused call changes
-    /// nothing but the count of calls. A request for another step, or with an observation that cannot be
-    /// made, is refused before it counts. The call that ends the episode is the last one counted and
-    /// recorded; it closes the files.
+    /// Performs a request and returns the answer in the form for its audience. A refused call only increases
+    /// the count of calls. A request for another step, or with an observation that cannot be made, is refused
+    /// before it counts. The call that ends the episode is the last one counted and recorded; it closes the
+    /// files.
     ///
     /// # Errors
     ///
@@ -178,8 +178,8 @@ impl Session {
         self.perform(Request { caller, ..Request::of_policy(call) })?.reply()
     }
 
-    /// Observes like [`Session::call`] with `observe`, on behalf of a policy in this process. Views are
-    /// not encoded, and nothing is withheld. `shown` is the information shown to the policy beyond the
+    /// Observes like [`Session::call`] with `observe`, on behalf of a policy in this process. Views are not
+    /// encoded, and no data are withheld. `shown` is the information shown to the policy beyond the
     /// benchmark's own policies.
     pub fn observe(
         &mut self,
@@ -327,7 +327,7 @@ impl Session {
         }
     }
 
-    /// Counts the information in an answer from which everything withheld has been removed.
+    /// Counts the information in an answer from which withheld data have been removed.
     fn count(&mut self, answer: &Answer, called: &Called, caller: CallerRecord) {
         match (caller, answer) {
             (CallerRecord::Policy | CallerRecord::Operator(_), answer) => {
@@ -361,7 +361,7 @@ impl Session {
         Ok(())
     }
 
-    /// Makes the observation requested after a command, as a call of its own.
+    /// Makes the observation requested after a command, which counts as a separate call.
     fn look_after(
         &mut self,
         caller: CallerRecord,

@@ -33,7 +33,7 @@ const MAX_CHECKPOINT_BYTES: u64 = 64 << 20;
 pub struct Checkpoint {
     origin: Origin,
     progress: Progress,
-    /// The step after it, if the simulator failed in that step.
+    /// The step after the checkpoint, if the simulator failed in that step.
     pub(super) failed: Option<FailedStep>,
 }
 
@@ -91,7 +91,7 @@ struct Header {
 }
 
 impl Checkpoint {
-    /// Writes the checkpoint to a file. A reader sees the whole file or nothing.
+    /// Writes the checkpoint to a file. A reader sees the whole file or no file.
     pub fn write(&self, path: &Path) -> Result<(), EpisodeError> {
         Ok(write_whole(path, &self.to_bytes()?)?)
     }
@@ -160,14 +160,15 @@ impl Checkpoint {
 }
 
 impl Origin {
-    /// Describes everything that must be equal for progress to fit.
+    /// Describes all settings that must be equal for the progress to fit.
     fn episode(&self) -> String {
         let (task, seed, protocol) = (&self.spec.task.id, self.spec.world_seed(), self.spec.protocol.name());
         let (machine, told) = (self.machine(), self.told());
         format!("task {task} seed {seed} under the {protocol} protocol with {machine}, and {told}")
     }
 
-    /// Describes the information for the policy; it must match, since a policy keeps what it has read.
+    /// Describes the information for the policy. It must be the same, since a policy remembers the texts that
+    /// it has read.
     fn told(&self) -> String {
         let EpisodeSpec { assistance, disclosure, hints, instructions, camera, .. } = &self.spec;
         let words = instructions.as_ref().map_or("of the task", |words| &words.xxh3);

@@ -53,8 +53,8 @@ impl Rewind {
 }
 
 impl Session {
-    /// Handles a divergence of physics: the episode ends in the state before this step, in which the
-    /// robots had to do what is in `executed`. `motions` are from before the step.
+    /// Handles a divergence of physics: the episode ends in the state before this step, in which the robots
+    /// had to execute `executed`. `motions` are from before the step.
     pub(super) fn fail(
         &mut self,
         diverged: Diverged,

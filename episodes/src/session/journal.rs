@@ -17,10 +17,10 @@ pub struct JournalEntry {
     /// The policy's thinking time when the request came, in nanoseconds.
     thought_ns: u64,
     pub(super) asked: KeptRequest,
-    /// State of the world afterwards, if it has moved.
+    /// State of the world afterwards, if it has changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) state: Option<StateMark>,
-    /// Reason for the end of the episode, if it had ended by then.
+    /// Reason for the end of the episode, if it had ended by that time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndReason>,
 }

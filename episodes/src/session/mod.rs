@@ -1,5 +1,5 @@
-//! Sessions: an episode's world, its rules, and the tool calls that act on it. A session is synchronous
-//! and lives on a thread of its own.
+//! Sessions: an episode's world, its rules, and the tool calls that act on it. A session is synchronous and
+//! runs on its own thread.
 
 mod answer;
 mod build;
@@ -74,7 +74,7 @@ pub struct Session {
     /// Number of requests: calls, with one for each plan. `None` in a replay, where the calls of plans
     /// are not marked.
     requests: Option<u32>,
-    /// Requests and thinking time of the operators, by robot, as the host says with their commands.
+    /// Requests and thinking time of the operators, by robot, as the host reports with their commands.
     operators: BTreeMap<String, OperatorUse>,
     /// True while the commands of a plan are made.
     planning: bool,
@@ -345,8 +345,8 @@ impl Session {
         }
     }
 
-    /// Returns what a recording keeps of a step beside the commands: executed commands only if they may
-    /// differ from these.
+    /// Returns the recorded data of a step besides the commands. Executed commands are included only if they
+    /// may differ from the policy's.
     fn recorded(&self, executed: &Executed) -> Executed {
         match self.execution {
             Some(_) => executed.clone(),

@@ -1,6 +1,5 @@
 //! Entries of an episode for its readers that are not calls: notes, calls refused before they reached the
-//! episode, and plans, whose commands are calls of their own. They do not affect state, counts, budget or
-//! clock.
+//! episode, and plans, whose commands are separate calls. They do not affect state, counts, budget or clock.
 
 use tandem_tools_spec::{Note, SpecError};
 

@@ -152,7 +152,7 @@ impl RunFiles {
         }
     }
 
-    /// Waits until everything recorded is on its way to the disk, or has failed.
+    /// Waits until all recorded data are on their way to the disk, or a write has failed.
     pub(super) fn flush(&mut self) {
         if let Some(recorder) = &self.recorder {
             recorder.flush();
@@ -186,7 +186,7 @@ impl RunFiles {
         result.recording_failed = self.failed().map(str::to_owned);
         self.note(write_result(result, &self.folder).map(drop));
         result.recording_failed = self.failed().map(str::to_owned);
-        // Removes the folder if nothing could be written into it; otherwise it is not empty, and stays.
+        // Removes the folder if no file could be written there. A folder with files stays.
         let _ = fs::remove_dir(&self.folder);
     }
 

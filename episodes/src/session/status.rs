@@ -31,7 +31,7 @@ impl Session {
     }
 
     pub(super) fn budget(&self) -> Budget {
-        // The host keeps the operators' clocks, and says in their replies what is left.
+        // The host keeps the operators' clocks, and reports the remaining time in their replies.
         let clock_left = match self.spec().operators {
             Operators::One => self.clock.left(),
             Operators::PerRobot => self.rules.thinking,
@@ -143,7 +143,8 @@ impl Session {
         }
     }
 
-    /// Returns the full result, whatever the policy may know of it. After the end it is final.
+    /// Returns the full result, including what the assistance hides from the policy. The result is final
+    /// after the end.
     pub fn result(&self) -> ResultReply {
         match &self.result {
             Some(result) => result.clone(),

@@ -1,4 +1,4 @@
-//! Seeds drawn by an evaluator's key, and the seed that a policy is told.
+//! Seeds drawn by an evaluator's key, and the seed that a policy receives.
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::Assistance;

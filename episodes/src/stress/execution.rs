@@ -1,5 +1,5 @@
-//! Execution of commands that differs from the policy's: late commands, a failing partner, and slow noise,
-//! if an episode asks for any of these.
+//! Execution of commands that differ from the policy's: late commands, a failing partner, and slow noise, if
+//! an episode has any of these.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use super::partner::FailingPartner;
 use super::{Stress, StressAxis, latency};
 use crate::variation::Disturbance;
 
-/// Largest change of a joint's target in a control step, 2 rad/s, until a robot has caught up with its
+/// Maximum change of a joint's target in a control step, 2 rad/s, until a robot has caught up with its
 /// commands.
 const CATCH_UP_RAD: f32 = 0.04;
 

@@ -7,7 +7,7 @@ use super::StressLevel;
 use crate::tasks::Task;
 
 /// Remaining share of friction. Rubber pads on dry wood or steel have a coefficient of 0.8, and wet ones
-/// about half of it.
+/// about half as much.
 const LEFT: [f64; 3] = [0.85, 0.7, 0.55];
 
 pub fn alter(world: &mut World, task: &Task, level: StressLevel) {

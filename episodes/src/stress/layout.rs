@@ -36,7 +36,7 @@ fn files() -> &'static Distractors {
     })
 }
 
-/// Largest distance between an object's lowest point and the top of its support.
+/// Maximum distance between an object's lowest point and the top of its support.
 const CONTACT_M: f32 = 0.015;
 /// Free space beside a distractor; `ABOVE_M` is that above the support.
 const BESIDE_M: f32 = 0.03;
@@ -44,7 +44,7 @@ const ABOVE_M: f32 = 0.01;
 /// Number of placement attempts for each distractor.
 const DRAWS: usize = 400;
 
-/// Least distances of a distractor on one kind of support from relevant things.
+/// Minimum distances of a distractor on one kind of support from relevant things.
 struct Clearance {
     /// Distance from middle to middle, minus both radii.
     object_m: f32,
@@ -53,7 +53,7 @@ struct Clearance {
     robot_m: f32,
     /// Distance from the lines from robots to objects.
     reach_m: f32,
-    /// Largest distance from the task's middle.
+    /// Maximum distance from the task's middle.
     farthest_m: f32,
 }
 
@@ -71,8 +71,8 @@ struct Support {
     is_floor: bool,
 }
 
-/// Returns the distractors of an episode of `task` in `world`, which has everything else. There are at most
-/// `most`, fewer if there is no room.
+/// Returns the distractors of an episode of `task` in `world`, which already has all other objects. There are
+/// at most `most`, and fewer if there is no space.
 pub fn distractors(
     most: usize,
     seed: u32,
@@ -158,7 +158,7 @@ impl Places {
         Ok(Places { middle_m: [mean(0), mean(1)], objects_m, bases_m, robots_m })
     }
 
-    /// Returns `true` if something of this radius would be too near to a relevant thing, or too far from the
+    /// Returns `true` if an object of this radius would be too near to a relevant object, or too far from the
     /// task's middle.
     fn are_near(&self, at_m: [f32; 2], radius_m: f32, clearance: &Clearance) -> bool {
         let Clearance { object_m, way_m, robot_m, reach_m, farthest_m } = clearance;
@@ -216,7 +216,7 @@ impl Support {
         [self.middle_m[0] + cosine * x_m - sine * y_m, self.middle_m[1] + sine * x_m + cosine * y_m]
     }
 
-    /// Returns `true` if something of this radius fits on the support without overhang.
+    /// Returns `true` if an object of this radius fits on the support without overhang.
     fn holds(&self, at_m: [f32; 2], radius_m: f32) -> bool {
         let [x_m, y_m] = [at_m[0] - self.middle_m[0], at_m[1] - self.middle_m[1]];
         let (sine, cosine) = self.yaw_rad.sin_cos();

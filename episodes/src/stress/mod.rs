@@ -161,7 +161,7 @@ impl Stress {
         self.on(StressAxis::Layout).map_or(plain, |level| plain.max(layout::spread(level)))
     }
 
-    /// Returns the sensing under stress, in place of the plain one.
+    /// Returns the sensing under stress, which replaces the plain one.
     pub fn sensing(self, plain: Sensing) -> Sensing {
         let on = self.on(StressAxis::Sensors);
         on.map_or(plain, |level| Sensing { sensors: sensors::model(level), ..plain })

@@ -1,6 +1,6 @@
-//! Partner stress: one robot of the team fails. By the seed it freezes, reacts late, walks off, drops what
-//! it holds, or says nothing. The failure acts between its commands and their execution, like a technical
-//! fault.
+//! Partner stress: one robot of the team fails. By the seed it freezes, reacts late, walks off, drops its
+//! object, or does not send messages. The failure acts between its commands and their execution, like a
+//! technical fault.
 
 use std::f32::consts::TAU;
 

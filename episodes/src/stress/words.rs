@@ -79,7 +79,7 @@ mod tests {
             );
             for words in &levels {
                 assert_eq!(words.robots.len(), task.robots.len());
-                // Partners may face each other, and each has its own side.
+                // Partners may face each other, so their left and right differ.
                 for (told, robot) in words.robots.iter().zip(&task.robots) {
                     for (side, other) in [("left", "right"), ("right", "left")] {
                         let asked = has(&robot.instruction, side) && !has(&robot.instruction, other);

@@ -61,9 +61,9 @@ pub struct TaskDefinition {
     pub phases: Arc<[Phase]>,
     /// Conditions of each phase with their expressions.
     pub conditions: Vec<Vec<PhaseCondition>>,
-    /// True when the file requires closing hands, whatever its conditions require.
+    /// True if the file requires closing hands, even if no condition requires them.
     pub says_needs_fingers: bool,
-    /// Grips that the brief explains; `None` for every one of them.
+    /// Grips that the brief explains; `None` for all grips.
     pub grips: Option<Vec<GripKind>>,
     pub origin: TaskOrigin,
     pub source: TaskSource,
@@ -261,8 +261,8 @@ impl TaskDefinition {
         }
     }
 
-    /// Returns true if the robots need a thumb and fingers to hold something: a condition requires it, or
-    /// the file says so.
+    /// Returns true if the robots need a thumb and fingers to hold an object, because of a condition or the
+    /// file's entry.
     pub fn needs_fingers(&self) -> bool {
         self.says_needs_fingers || asks_for_fingers(&self.source.text)
     }

@@ -93,7 +93,7 @@ fn a_checkpoint_is_no_start_for_robots_that_know_themselves_otherwise() {
     assert!(text.contains("state estimate estimator") && text.contains("state estimate truth"), "{text}");
 }
 
-/// A policy does not forget what it has read, and results depend on it.
+/// A policy remembers the texts that it has read, and results depend on them.
 #[test]
 fn a_checkpoint_is_no_start_for_policies_that_are_told_otherwise() {
     let folder = tempfile::tempdir().unwrap();

@@ -318,7 +318,7 @@ fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
     assert_eq!(told(compliance), ["wrist commands: compliance"]);
 }
 
-/// Degrees in place of radians are the usual mistake.
+/// Degrees instead of radians are the usual mistake.
 #[test]
 fn joint_targets_beyond_their_limits_are_counted() {
     let told = |arm: f64| {
@@ -355,8 +355,8 @@ fn drives(session: &mut Session, steps: usize, gain: f64) -> ToolCall {
     SendJointDrives { robots: vec![JointDrives { robot: "A".into(), rows: vec![row; steps] }] }.into()
 }
 
-/// Whoever drives the motors balances the robot: limp, it falls while all wait. Handed back in time, it
-/// stands. The partner is not concerned.
+/// A caller that drives the motors has to balance the robot. A limp robot falls while all wait. A robot that
+/// is handed back in time stands. The partner is unaffected.
 #[test]
 fn a_robot_whose_motors_are_driven_is_balanced_by_nobody_until_it_is_handed_back() {
     let mut session = handover(2);

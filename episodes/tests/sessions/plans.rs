@@ -116,7 +116,7 @@ fn a_wait_ends_where_one_of_several_conditions_holds() {
     assert!(stopped.contains("what p1, the next phase, lacks; a hand feels"), "{stopped}");
 }
 
-/// A hand goes down at one speed until it touches, and a wait ends with what it is for.
+/// A hand goes down at one speed until it touches, and a wait ends once its condition holds.
 #[test]
 fn a_command_lasts_until_what_it_expects_holds() {
     let mut session = agentic();
@@ -211,8 +211,8 @@ fn a_plan_walks_and_goes_on() {
     assert!(refused.contains("no robot \"C\""), "{refused}");
 }
 
-/// A plan's commands are what the tools take, `short` among it: the reply is short where the last command
-/// asked for that.
+/// A plan's commands have the arguments of the tools, including `short`. The reply is short if the last
+/// command asks for that.
 #[test]
 fn commands_of_a_plan_may_ask_for_short_replies() {
     let mut session = agentic();
@@ -233,7 +233,7 @@ fn commands_of_a_plan_may_ask_for_short_replies() {
     assert!(refused.contains("command 1 of ") && refused.contains("short"), "{refused}");
 }
 
-/// Two robots stand; one of them has nothing to report.
+/// Two robots stand. The report on one of them is empty.
 #[test]
 fn a_robot_that_did_nothing_is_not_told_of() {
     let mut session = agentic();

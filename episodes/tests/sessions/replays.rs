@@ -101,7 +101,7 @@ fn noise_is_the_same_again() {
     let begun = |spec: EpisodeSpec| read(&mut Session::start(&spec, None).unwrap());
     assert_eq!(begun(noisy(5)), first);
     assert_ne!(begun(noisy(6)), first);
-    // Apart from objects, nothing else depends on the seed.
+    // Only objects depend on the seed.
     let exact = |seed: u32| begun(spec("handover", seed, Protocol::Benchmark));
     assert_eq!(exact(5), exact(6));
 }

@@ -1,4 +1,4 @@
-//! Tests of transcripts: they include every call, counted or not, and notes, and change nothing else.
+//! Tests of transcripts: they include every call, counted or not, and notes, and have no other effect.
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
-"""The smallest agent, of Python's standard library alone: every robot lifts its right hand by 10 cm, then the episode is finished.
+"""A minimal agent with Python's standard library alone: every robot lifts its right hand by 10 cm, then the agent finishes.
 
     tandem evaluate --policy exec:"python3 gateway/examples/agents/agent.py" --tasks handover --seeds 0 --out runs/agent
 
-With --per-robot it is started for each robot, and lifts the hand of that one.
+With --per-robot it is started for each robot, and lifts only that robot's hand.
 """
 
 import json
@@ -24,7 +24,7 @@ def call(tool, **arguments):
 
 
 def raised(robot):
-    """The pose of a robot's right wrist, 10 cm further up."""
+    """Returns the pose of a robot's right wrist, 10 cm higher."""
     wrist = call("get_robot_state", robot=robot)["right_wrist"]
     x, y, z = wrist["position_m"]
     return {"robot": robot, "right_position_m": [x, y, z + RISE_M], "right_quaternion_wxyz": wrist["quaternion_wxyz"]}

@@ -1,5 +1,5 @@
-"""A team that talks, of Python's standard library alone: who is asked to tell the others something says it; the others wait
-until they have heard it, say it again, and hold still. It shows how words pass between operators, and takes nothing.
+"""A team that communicates, with Python's standard library alone. The operator that is asked to inform the others sends a
+message. The others wait for it, repeat it, and hold still. The example shows how messages pass; it grasps nothing.
 
     tandem evaluate --policy exec:"python3 gateway/examples/agents/words.py" --per-robot --talk --protocol benchmark \
         --tasks which_one --seeds 0 --out runs/words
@@ -13,7 +13,7 @@ import urllib.request
 
 EPISODE = f"{os.environ['TANDEM_URL']}/v1/episodes/{os.environ['TANDEM_EPISODE']}"
 ROBOT = os.environ["TANDEM_ROBOT"]
-# What the instructions of tandem+ call what the seed has chosen, and how they ask for words.
+# Pattern of the instructions of tandem+: the option that the seed has chosen, and the request for a message.
 TOLD = re.compile(r"[^.:]*\b(red|green|blue|yellow|orange)\b[^.:]*knows? that: say so")
 WAITS = 20
 

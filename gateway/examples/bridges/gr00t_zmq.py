@@ -1,4 +1,4 @@
-"""Lets GR00T's own server answer Tandem: what comes as `/act` over HTTP goes on to its `get_action` over ZMQ.
+"""Bridge from Tandem to GR00T's own server: passes `/act` requests over HTTP to its `get_action` over ZMQ.
 
     python3 gateway/examples/bridges/gr00t_zmq.py --server tcp://127.0.0.1:5555 --port 8001
     tandem evaluate --policy act:http://127.0.0.1:8001/act --policy-map gr00t_n17_g1 --protocol benchmark
@@ -20,7 +20,7 @@ import zmq
 
 
 def to_npy(value):
-    """Arrays as GR00T's `MsgSerializer` writes them."""
+    """Encodes arrays like GR00T's `MsgSerializer`."""
     if isinstance(value, np.ndarray):
         file = io.BytesIO()
         np.save(file, value, allow_pickle=False)
@@ -35,7 +35,7 @@ def from_npy(entry):
 
 
 def from_json(entry):
-    """Arrays as Tandem writes them."""
+    """Encodes arrays like Tandem."""
     if "__numpy__" in entry:
         values = np.frombuffer(base64.b64decode(entry["__numpy__"]), entry["dtype"])
         return values.reshape(entry["shape"])
@@ -72,13 +72,13 @@ class Gr00t:
                 self.socket.send(msgpack.packb(request, default=to_npy))
                 answer = msgpack.unpackb(self.socket.recv(), object_hook=from_npy)
             except zmq.ZMQError as error:
-                # A socket that waits for an answer takes no other request.
+                # A socket that waits for an answer accepts no other request.
                 self.socket.close()
                 self.socket = None
                 raise RuntimeError(f"GR00T at {self.address}: {error}") from error
         if isinstance(answer, dict) and "error" in answer:
             raise RuntimeError(f"GR00T: {answer['error']}")
-        # Newer servers answer with the action and what else they know.
+        # Newer servers return the action with further information.
         return answer[0] if isinstance(answer, list) else answer
 
 

@@ -1,7 +1,7 @@
 """Tandem as an environment of LeRobot's EnvHub: put this file into a repository of the hub, and its name into `make_env`.
 
-LeRobot asks for `make_env(n_envs, use_async_envs, cfg)` and gets a vector environment of each task, by suite and number. All
-worlds of one step in Rust on threads of their own, whether or not processes are asked for.
+LeRobot calls `make_env(n_envs, use_async_envs, cfg)` and gets a vector environment of each task, by suite and number. All
+worlds of a vector environment step in Rust on threads of their own, whether or not processes are requested.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TASKS = ("handover", "co_carry")
 
 
 class FilmedVectorEnv(TandemVectorEnv, SyncVectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """What `lerobot-eval` films: it asks the `envs` of a `SyncVectorEnv` for pictures, and those of no other."""
+    """Environment for the films of `lerobot-eval`, which reads images only from the `envs` of a `SyncVectorEnv`."""
 
 
 def make_env(n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None) -> dict[str, dict[int, TandemVectorEnv]]:

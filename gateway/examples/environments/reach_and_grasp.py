@@ -1,12 +1,12 @@
-"""Learning by doing: A's right hand learns to reach for Handover's bottle, to close on it and to lift it.
+"""Reinforcement learning: A's right hand learns to reach for Handover's bottle, to close on it and to lift it.
 
     pip install -r gateway/examples/environments/reach_and_grasp.txt
     pip install "./gateway/python[gym]"
     python gateway/examples/environments/reach_and_grasp.py --out runs/reach_and_grasp
 
 Proximal policy optimisation of Stable-Baselines3, from scratch, on the native vector environment and with its dense rewards: no
-demonstration, no expert. Five times a second the policy says which way the wrist goes on and whether the hand opens or
-closes; the hand stays level. It senses its own arm and fingers and sees no picture. `curve.csv` has a line for each rollout.
+demonstration, no expert. Five times a second the policy chooses the direction of the wrist and whether the hand opens
+or closes; the hand stays level. It senses its own arm and fingers and sees no image. `curve.csv` has a line for each rollout.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class ReachAndGrasp(VecEnv):
             share = (step + 1) / DECISION_STEPS
             between = [(1 - share) * old + share * new for old, new in zip(before, (self.target_m, self.closed), strict=True)]
             seen, earned, terminated, truncated, infos = self.envs.step(self.row(*between))
-            # What lies behind the first phase is not asked for.
+            # Later phases are not part of the environment.
             rewards += np.where(grasped, 0.0, earned)
             grasped |= infos["phases"] >= 1
             over |= terminated | truncated
@@ -134,7 +134,7 @@ class ReachAndGrasp(VecEnv):
 
 
 def begun_rows() -> Any:
-    """Rows that hold both robots as they begin."""
+    """Returns rows that hold both robots in their initial postures."""
     rows = np.zeros((2, ROW))
     with tandem.Episode("handover", FIRST_SEED, protocol="benchmark") as episode:
         columns, state = list(episode.state_columns), episode.state()
@@ -145,7 +145,7 @@ def begun_rows() -> Any:
 
 
 class Curve(BaseCallback):
-    """A line for each rollout: how the episodes went that ended in it."""
+    """Writes a line for each rollout, about the episodes that ended in it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -168,7 +168,7 @@ class Curve(BaseCallback):
 
 
 def lifted(learner: PPO, envs: ReachAndGrasp, seeds: range) -> int:
-    """In how many episodes of these seeds, which nothing was learned from, the bottle is lifted, with no chance in actions."""
+    """Returns the number of episodes of these unseen seeds in which the bottle is lifted, with deterministic actions."""
     count = 0
     for first_seed in seeds[:: envs.num_envs]:
         envs.first_seed = first_seed

@@ -3,8 +3,8 @@
     pip install "./gateway/python[gym,ray]"
     python gateway/examples/environments/rollouts.py
 
-The learner is the cross-entropy method, and what it looks for is one pose of A's right arm in Handover, seven joint angles:
-dense rewards tell how near it brings the hand to holding the bottle. A policy gradient has the same shape: parameters go to the
+The learner is the cross-entropy method. It searches for one pose of A's right arm in Handover, seven joint angles. Dense
+rewards measure how near the pose brings the hand to holding the bottle. A policy gradient has the same shape: parameters go to the
 actors, returns come back. In a larger cluster (RAY_ADDRESS), more actors use more machines.
 """
 
@@ -33,13 +33,13 @@ ELITE_SHARE = 0.25
 
 @ray.remote(num_cpus=1)
 class Player:
-    """A batch of worlds, which stays where it is; only numbers travel."""
+    """A batch of worlds in one process; only parameters and returns are sent."""
 
     def __init__(self, worlds: int) -> None:
         self.envs = TandemVectorEnv("handover", worlds, threads=1, obs_type="state", reward_type="dense")
 
     def returns(self, poses_rad: Any, steps: int) -> Any:
-        """What each candidate earns: the arm goes to its pose in the first half of the steps, and stays there."""
+        """Returns the return of each candidate: the arm moves to its pose in the first half of the steps, and stays there."""
         worlds = self.envs.num_envs
         seen, _ = self.envs.reset(seed=[SEED] * worlds)
         begun = seen["agent_pos"].reshape(worlds, 2, -1)[:, 0, RIGHT_ARM_SEEN].copy()

@@ -1,9 +1,9 @@
-"""Serves a policy of LeRobot's as `/act`, for Tandem to ask. It runs where `lerobot` is installed.
+"""Serves a LeRobot policy as `/act` for Tandem. It runs where `lerobot` is installed.
 
     python3 gateway/examples/servers/lerobot_act.py --policy USER/POLICY --device cuda --port 8001
     tandem evaluate --policy act:http://127.0.0.1:8001/act --policy-map lerobot.toml --protocol benchmark
 
-The map, whose pictures, states and actions are those that the policy was trained on, under LeRobot's own keys:
+The map has the images, states and actions on which the policy was trained, under LeRobot's own keys:
 
     preset = "openpi"
     [images]
@@ -17,8 +17,8 @@ The map, whose pictures, states and actions are those that the policy was traine
     [chunk]
     rate_hz = 30.0
 
-It is for policies that decide by what they see at the moment, as ACT, pi0.5 and SmolVLA do, and not for those that put several
-moments together, as diffusion does: one server is asked by all robots and worlds in turn.
+It is for policies that use only the present observation, for example ACT, pi0.5 and SmolVLA. It does not serve policies that
+combine several moments, for example diffusion policies, because one server answers all robots and worlds in turn.
 """
 
 import argparse
@@ -31,7 +31,7 @@ import numpy as np
 
 
 def load(name, device):
-    """What answers an observation under LeRobot's keys with rows of actions."""
+    """Returns a function from observations under LeRobot's keys to rows of actions."""
     import torch
     from lerobot.configs.policies import PreTrainedConfig
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
@@ -54,14 +54,14 @@ def load(name, device):
 
 
 def from_json(entry):
-    """Arrays as Tandem writes them; LeRobot writes into them."""
+    """Decodes arrays of Tandem; they are writable, as LeRobot requires."""
     if "__numpy__" in entry:
         return np.frombuffer(base64.b64decode(entry["__numpy__"]), entry["dtype"]).reshape(entry["shape"]).copy()
     return entry
 
 
 def handler(infer):
-    # A policy is one model, which answers one request after the other.
+    # A policy is one model, which answers one request after another.
     one_by_one = threading.Lock()
 
     class Handler(http.server.BaseHTTPRequestHandler):

@@ -108,7 +108,7 @@ fn rates(samples: Option<&SensorSamples>) -> Vec<f64> {
     latest.unwrap_or_else(|| vec![0.0; STATE_BASE - STATE_RATES])
 }
 
-/// Moment of an episode, for policies with memory at servers that may have several episodes at once.
+/// Moment of an episode, for policies with memory on servers that may have several episodes at once.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EpisodeMoment {
     /// Number of the episode, above 0, that a 32-bit float represents exactly.

@@ -1,5 +1,4 @@
-//! Reasons why a policy server gives no action. Each message says what was received and what was
-//! expected.
+//! Reasons why a policy server gives no action. Each message states the received and the expected value.
 
 use std::time::Duration;
 

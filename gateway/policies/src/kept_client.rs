@@ -13,7 +13,7 @@ use crate::client::PolicyClient;
 /// another 20 s.
 const LONGEST_SILENCE: Duration = Duration::from_secs(5);
 
-/// A client whose connection stays alive for as long as this is held, even while it is idle.
+/// A client whose connection stays open while this value exists, even if it is idle.
 pub struct KeptClient {
     shared: Arc<SharedClient>,
     keeper: Option<JoinHandle<()>>,
@@ -43,7 +43,7 @@ impl KeptClient {
             Arc::new(SharedClient { client, is_dropped: Mutex::new(false), dropped: Condvar::new() });
         let kept = shared.clone();
         let keeper = thread::Builder::new().name("policy's connection".into());
-        // Without a thread, the server has to be patient.
+        // If no thread can be started, pings of the server stay unanswered while the client is idle.
         let keeper = keeper.spawn(move || kept.keep_alive(every)).ok();
         KeptClient { shared, keeper }
     }

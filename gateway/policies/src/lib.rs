@@ -1,5 +1,5 @@
-//! Learned policies as servers, of which Tandem is the client. A map assigns the images and values of
-//! requests and answers to keys.
+//! Learned policies as servers; Tandem is their client. A map assigns the images and values of requests and
+//! answers to keys.
 
 mod action;
 mod client;

@@ -24,7 +24,7 @@ const FIRST_ANSWER: Duration = Duration::from_secs(600);
 /// Interval between attempts to connect to a server that is not listening yet.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Connected servers of a policy, each of which has answered once.
+/// Connected servers of a policy. Each of them has answered once.
 pub struct PolicySession<'a> {
     plan: QueryPlan<'a>,
     /// One client for all robots, or one for each.

@@ -116,7 +116,7 @@ impl ReplyValue {
     ///
     /// # Errors
     ///
-    /// Returns a description of what is wrong with them.
+    /// Returns a description of the mistakes in the values.
     pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<ReplyValue, String> {
         let values: Vec<f64> = match dtype {
             "<f4" => read(bytes, |four| f32::from_le_bytes(four).into()),

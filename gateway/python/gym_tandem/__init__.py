@@ -16,7 +16,7 @@ from .worlds import Options
 
 
 def env_id(task: str) -> str:
-    """What Gymnasium calls a task: "gym_tandem/CoCarry-v0" for "co_carry"."""
+    """Returns Gymnasium's id of a task: "gym_tandem/CoCarry-v0" for "co_carry"."""
     name = "".join(part.capitalize() for part in task.split("_"))
     return f"gym_tandem/{name}-v0"
 

@@ -13,23 +13,25 @@ from .worlds import Observation, Options, Outcome, Worlds
 
 
 class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
-    """An episode under the benchmark protocol; a step is one control step of 20 ms, or with `fps` as long as a data set's row.
+    """An episode under the benchmark protocol. A step is one control step of 20 ms.
+
+    With `fps` a step is as long as a row of a data set.
 
     Observations: `agent_pos`, float32, for each robot in turn 43 joint angles in radians and the base command (m/s, m/s, rad/s,
-    m), and `pixels`: by robot what its head camera sees, height by width by 3, uint8.
+    m). `pixels` has the image of each robot's head camera, height by width by 3, uint8.
     Actions: float32, for each robot in turn 31 joint targets in radians and the base command; with `action_type="wrists"` both
     wrists' poses in its pelvis frame (x, y, z in metres, then w, x, y, z), both hands' fingers (7 angles in radians each) and
     the base command.
     `contract` names every number, with its unit and range.
-    Rewards: 1 for each phase in the step that reaches it. With `reward_type="dense"` what a step adds to the progress: phases
-    reached, and how near the next one is, from 0 to 1. A whole episode gives at most 3 either way.
+    Rewards: 1 in the step that reaches a phase. With `reward_type="dense"`, the increase of progress in the step: the number of
+    phases reached, plus the nearness of the next one, from 0 to 1. A whole episode gives at most 3 in both cases.
     An episode terminates with the last phase or with a fall, and is truncated when its steps are used up.
 
-    `reset(seed=n)` begins the episode of seed n; without a seed, that of the seed after the last one, and at first 2000: the
-    episode's index alone says where it begins, however often anything was reset between.
+    `reset(seed=n)` begins the episode of seed n. Without a seed it begins that of the seed after the last one, at first 2000.
+    The start of an episode depends on its seed alone, and not on earlier resets.
 
     Args:
-        task: A task's id, as "handover".
+        task: Id of a task, for example "handover".
         options: See `Options`.
     """
 
@@ -63,11 +65,11 @@ class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
         return self._worlds.of_world(0), float(rewarded), bool(terminated), bool(truncated), self._info(outcome)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """What all robots see, side by side."""
+        """Returns the images of all robots, side by side."""
         return None if self.render_mode is None else self._worlds.draw(0)
 
     def state_hash(self) -> str:
-        """Equal for equal physical states of the same build, 16 hexadecimal digits."""
+        """Returns 16 hexadecimal digits that are equal for equal physical states of the same build."""
         return self._worlds.state_hash(0)
 
     def close(self) -> None:

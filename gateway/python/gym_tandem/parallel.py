@@ -16,14 +16,14 @@ Stepped = tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[
 
 
 class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
-    """An episode as `TandemEnv` has it, with agents `A`, `B` and, in tasks of three, `C`.
+    """An episode like that of `TandemEnv`, with the agents `A`, `B` and, in tasks of three robots, `C`.
 
-    Each agent has its own robot's part of observation and action, as in a data set of single robots: its picture is called
-    `egocentric`, and `contract` names every number. All of them get the same rewards, and their episode
-    ends for all at once. `instructions` has what each is asked to do.
+    Each agent has its own robot's part of observation and action, as in a data set of single robots. Its image is called
+    `egocentric`, and `contract` names every number. All agents get the same rewards, and the episode ends for all at once.
+    `instructions` has the instruction of each agent.
 
     Args:
-        task: A task's id, as "handover".
+        task: Id of a task, for example "handover".
         options: See `Options`.
     """
 
@@ -82,7 +82,7 @@ class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         )
 
     def render(self) -> NDArray[np.uint8] | None:
-        """What all robots see, side by side."""
+        """Returns the images of all robots, side by side."""
         return None if self.render_mode is None else self._worlds.draw(0)
 
     def close(self) -> None:
@@ -100,5 +100,5 @@ class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 def parallel_env(
     task: str = "handover", *, render_mode: Literal["rgb_array"] | None = None, **options: Unpack[Options]
 ) -> TandemParallelEnv:
-    """The task as PettingZoo's parallel environments are made."""
+    """Creates the environment of a task, as PettingZoo's parallel environments are created."""
     return TandemParallelEnv(task, render_mode=render_mode, **options)

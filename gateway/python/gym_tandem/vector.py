@@ -1,4 +1,4 @@
-"""Many episodes of one task as one Gymnasium environment: a call a batch, all worlds in Rust."""
+"""Many episodes of one task as one Gymnasium environment: one call steps all worlds, in Rust."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Stepped = tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.
 
 
 class WorldView:
-    """One world of a vector environment, to ask and not to step."""
+    """Read-only view of one world of a vector environment."""
 
     def __init__(self, vector: TandemVectorEnv, world: int) -> None:
         self._vector = vector
@@ -31,24 +31,24 @@ class WorldView:
         self._max_episode_steps = vector.max_episode_steps
 
     def render(self) -> NDArray[np.uint8] | None:
-        """What all robots of the world see, side by side."""
+        """Returns the images of all robots of the world, side by side."""
         return self._vector.draw(self._world)
 
 
 class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
-    """Episodes as `TandemEnv` has them, in worlds that step on threads of their own, with Python's lock free.
+    """Episodes like those of `TandemEnv`, in worlds that step on threads of their own, with Python's lock released.
 
-    `reset(seed=n)` begins episode n + i in world i, and a list gives each its own. The k-th episode that begins by itself in a
-    world has the seed that lies k times the number of worlds further; `reset()` without a seed begins the round after the
-    last one. No episode depends on how soon another one ended.
+    `reset(seed=n)` begins episode n + i in world i; a list has a seed for each world. The k-th episode that begins
+    automatically in a world has the seed increased by k times the number of worlds. `reset()` without a seed begins the round
+    after the last one. No episode depends on the length of another one.
 
     Args:
-        task: A task's id, as "handover".
-        num_envs: How many worlds.
-        autoreset_mode: When the next episode begins in a world whose last one is over: in place of the next step, in
-            the same step (`final_obs` and `final_info` have the end of the last one), or not before
+        task: Id of a task, for example "handover".
+        num_envs: Number of worlds.
+        autoreset_mode: Beginning of the next episode in a world whose last one is over: in place of the next step, in the
+            same step (`final_obs` and `final_info` have the end of the last one), or only by
             `reset(options={"reset_mask": ...})`.
-        threads: On how many threads worlds step. 0: one a core.
+        threads: Number of threads on which worlds step. 0: one per core.
         copy: False: observations are the arrays that the next step writes into.
         options: See `Options`.
     """
@@ -109,31 +109,31 @@ class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]])
         return self._observed(), outcome.rewards, outcome.terminated, outcome.truncated, self._infos(outcome)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """What all robots of each world see, side by side."""
+        """Returns the images of all robots of each world, side by side."""
         if self.render_mode is None:
             return None
         return tuple(self._worlds.draw(world) for world in range(self.num_envs))
 
     @property
     def envs(self) -> tuple[WorldView, ...]:
-        """What is the same in every world, and what each shows, as harnesses ask `SyncVectorEnv` for it."""
+        """Views of the worlds, which harnesses request as from a `SyncVectorEnv`."""
         return tuple(WorldView(self, world) for world in range(self.num_envs))
 
     def draw(self, world: int) -> NDArray[np.uint8] | None:
-        """What all robots of a world see, side by side."""
+        """Returns the images of all robots of a world, side by side."""
         return None if self.render_mode is None else self._worlds.draw(world)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """What an attribute is in each world, or what its method returns."""
+        """Returns an attribute of each world, or the result of its method."""
         found = [getattr(env, name) for env in self.envs]
         return tuple(of(*args, **kwargs) if callable(of) else of for of in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """What an attribute is in each world."""
+        """Returns an attribute of each world."""
         return self.call(name)
 
     def state_hashes(self) -> tuple[str, ...]:
-        """By world, equal for equal physical states of the same build."""
+        """Returns a hash for each world, which is equal for equal physical states of the same build."""
         return tuple(self._worlds.state_hash(world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -144,7 +144,7 @@ class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]])
         return deepcopy(seen) if self._copy else seen
 
     def _infos(self, outcome: Outcome, chosen: NDArray[np.bool_] | None = None) -> dict[str, Any]:
-        """Arrays with an entry each world, and beside each which entries are of this step."""
+        """Returns arrays with an entry per world, each with a mask of the entries of this step."""
         of_all: NDArray[np.bool_] = np.ones(self.num_envs, np.bool_) if chosen is None else chosen
         anew = outcome.next_seeds >= 0
         phases = np.where(anew, 0, outcome.phases)

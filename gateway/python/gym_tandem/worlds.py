@@ -1,4 +1,4 @@
-"""What all environments share: worlds of one task in Rust, and the arrays that they write into."""
+"""Common part of all environments: worlds of one task in Rust, and the arrays that they write into."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ EPISODE_SETTINGS = ("renderer", "sensors", "camera", "stress", "level")
 
 
 class Options(TypedDict, total=False):
-    """What every environment takes beside the task. Names are those of LeRobot's environments, where it has one."""
+    """Options of every environment. Names are those of LeRobot's environments if these have the option."""
 
     obs_type: Literal["state", "pixels", "pixels_agent_pos"]
     """What is observed: `agent_pos` alone, `pixels` alone, or both, which is the default."""
@@ -85,7 +85,7 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a step came to, or a reset: an entry each world."""
+    """Outcome of a step or a reset, with an entry per world."""
 
     rewards: NDArray[np.float64]
     terminated: NDArray[np.bool_]
@@ -105,7 +105,7 @@ class Outcome:
 
 
 def _reworded(told: TaskInfo, options: Options) -> TaskInfo:
-    """The task in the words that its episodes have under this stress."""
+    """Returns the task in the wording of its episodes under this stress."""
     with tandem.Episode(told.id, protocol="benchmark", stress="words", level=options.get("level")) as episode:
         return replace(told, instruction=episode.briefing.instruction, robots=episode.briefing.instructions)
 
@@ -114,7 +114,7 @@ def environment_contract(task: TaskInfo, options: Options, *, apart: bool = Fals
     """Returns the layout of an environment's rows.
 
     Args:
-        apart: True for rows of one robot, of which every robot has its own.
+        apart: True for separate rows of each robot.
     """
     fps = integer(options.get("fps", RATES_HZ[0]), "fps")
     if fps not in RATES_HZ:
@@ -129,14 +129,14 @@ def environment_contract(task: TaskInfo, options: Options, *, apart: bool = Fals
 
 
 def picture_size(options: Options) -> tuple[int, int]:
-    """Returns width and height of pictures."""
+    """Returns width and height of images."""
     width, height = DEFAULT_SIZE_PX
     sides = options.get("observation_width", width), options.get("observation_height", height)
     return integer(sides[0], "observation_width"), integer(sides[1], "observation_height")
 
 
 class Worlds:
-    """Worlds of one task, their spaces, and what is seen of them."""
+    """Worlds of one task, with their spaces and observations."""
 
     def __init__(self, task: str, count: int, *, threads: int, options: Options, keeps_last: bool, apart: bool = False) -> None:
         told = next((entry for entry in tandem.tasks().tasks if entry.id == task), None)
@@ -177,7 +177,7 @@ class Worlds:
             self.size if self.sees else None,
             record,
         )
-        # At the end of the process, too: a recording is whole only once it is closed.
+        # This also happens at the end of the process, because a recording is complete only once it is closed.
         self.close = weakref.finalize(self, self._native.close)
         self._steps = 0
         self._seen = self._arrays()
@@ -185,7 +185,7 @@ class Worlds:
 
     @staticmethod
     def _check(options: Options) -> None:
-        """Refuses what an option does not know."""
+        """Refuses unknown values of an option."""
         for name, known in CHOICES.items():
             given = options.get(name, known[0])
             if given not in known:
@@ -199,13 +199,13 @@ class Worlds:
         return states, np.zeros((self.count, len(self.robots), height, width, 3), np.uint8)
 
     def action_box(self) -> gym.Space[NDArray[np.float32]]:
-        """An action of the contract. What lies beyond a limit is moved there."""
+        """Returns the space of actions of the contract. Values beyond a limit are clamped."""
         limits = np.array([(column.min, column.max) for column in self.contract.action], np.float32)
         box: gym.Space[Any] = gym.spaces.Box(limits[:, 0], limits[:, 1], dtype=np.float32)
         return box
 
     def observation_dict(self) -> gym.spaces.Dict:
-        """An observation of the contract."""
+        """Returns the space of observations of the contract."""
         spaces: dict[str, gym.Space[Any]] = {}
         if self.senses:
             spaces["agent_pos"] = gym.spaces.Box(-np.inf, np.inf, (len(self.contract.state),), np.float32)
@@ -216,7 +216,7 @@ class Worlds:
         return gym.spaces.Dict(spaces)
 
     def reset(self, seeds: list[int | None], chosen: list[bool] | None = None) -> Outcome:
-        """Begins an episode in each world, or in those that are chosen; without a seed, that of its next round."""
+        """Begins an episode in each world, or in the chosen ones; without a seed, the one of its next round."""
         begun = [-1 if seed is None else integer(seed, "a seed") for seed in seeds]
         for seed, number in zip(seeds, begun, strict=True):
             if seed is not None and not 0 <= number <= LARGEST_SEED:
@@ -227,14 +227,14 @@ class Worlds:
         return Outcome(*self._native.reset(chosen, begun, self._seen))
 
     def step(self, actions: ArrayLike, autoreset: str) -> Outcome:
-        """A row of each world, or the beginning of its next episode."""
+        """Executes a row in each world, or begins its next episode."""
         rows: NDArray[np.float32] = np.ascontiguousarray(actions, np.float32)
         robots, width = len(self.robots), self._action_columns
         shape = (self.count, robots, width)
         shapes = [(self.count, robots * width), shape]
         if self.count == 1:
             shapes += [(robots * width,), (robots, width)]
-        # What has as many numbers in another order would be taken for what it is not.
+        # An array with the same number of values in another order would be misread.
         if rows.shape not in shapes:
             raise ValueError(f"actions have the shape {rows.shape}; give {' or '.join(map(str, shapes))}")
         self._steps += 1
@@ -242,7 +242,7 @@ class Worlds:
         return Outcome(*self._native.step(np.reshape(rows, shape), autoreset, looks, self._seen, self._last))
 
     def batch(self) -> Observation:
-        """What is seen of all worlds. Arrays are those that the next step writes into."""
+        """Returns the observations of all worlds. The next step writes into the same arrays."""
         states, pictures = self._seen
         seen: Observation = {"agent_pos": np.reshape(states, (self.count, -1))} if self.senses else {}
         if pictures is not None:
@@ -250,7 +250,7 @@ class Worlds:
         return seen
 
     def of_world(self, world: int, *, last: bool = False) -> Observation:
-        """What is seen of one world, copied; of the episode before, where that has ended in the same step."""
+        """Returns a copy of one world's observation; of the episode before, if that has ended in the same step."""
         states, pictures = self._last if last and self._last is not None else self._seen
         seen: Observation = {"agent_pos": states[world].ravel().copy()} if self.senses else {}
         if pictures is not None:
@@ -258,7 +258,7 @@ class Worlds:
         return seen
 
     def of_robot(self, index: int) -> Observation:
-        """What one robot of the first world sees and senses, copied."""
+        """Returns a copy of the observation of one robot of the first world."""
         states, pictures = self._seen
         seen: Observation = {"agent_pos": states[0, index].copy()} if self.senses else {}
         if pictures is not None:
@@ -266,15 +266,15 @@ class Worlds:
         return seen
 
     def draw(self, world: int) -> NDArray[np.uint8]:
-        """What all robots of a world see, side by side."""
+        """Returns the images of all robots of a world, side by side."""
         return np.concatenate(list(self._native.draw(world, self.size)), axis=1)
 
     def state_hash(self, world: int) -> str:
-        """Equal for equal physical states of the same build, 16 hexadecimal digits."""
+        """Returns 16 hexadecimal digits that are equal for equal physical states of the same build."""
         return self._native.state_hash(world)
 
     def info(self, outcome: Outcome, world: int) -> dict[str, Any]:
-        """What is told of one world beside what it sees."""
+        """Returns the information on one world besides its observation."""
         told: dict[str, Any] = {
             "is_success": bool(outcome.phases[world] == len(self.task.phases)),
             "phases": int(outcome.phases[world]),

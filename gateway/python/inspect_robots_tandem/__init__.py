@@ -30,7 +30,7 @@ import tandem
 from gym_tandem import Options, TandemEnv
 from gym_tandem.worlds import LARGEST_SEED
 
-# How far a target may be from the one before it: as far as the experts' go in one step of 20 ms.
+# Maximum distance of a target from the one before it: that of the experts' targets in one step of 20 ms.
 _ARM_STEP_RAD = 0.08
 _FINGER_STEP_RAD = 0.35
 _HEIGHT_STEP_M = 0.06
@@ -58,15 +58,15 @@ class TandemEmbodiment(EmbodimentBase):
     Actions: for each robot in turn 31 joint targets and the base command (`joint_pos`), as `dim_labels` name them. With
     `action_type="wrists"` both wrists' poses in its pelvis frame, as positions and quaternions w, x, y, z (`eef_abs_pose`,
     `quat_wxyz`), both hands' fingers and the base command; the harness has no limits for these, nor an agent.
-    State: `joint_pos`, where what actions tell is measured to be, in their order; `joint_pos_all`, for each robot in turn 43
+    State: `joint_pos`, the measured values of the commanded joints, in their order; `joint_pos_all`, for each robot in turn 43
     joint angles and the base command.
-    Episodes: a scene's `init_seed` is Tandem's seed, so that its epochs begin alike; a scene without one begins by the trial's
-    own. Success is the last phase; `info` has `success`, `phases` (how many were reached), `is_fallen` and Tandem's `seed`.
+    Episodes: a scene's `init_seed` is Tandem's seed, so that its epochs begin alike; a scene without one uses the trial's seed.
+    Success is the last phase. `info` has `success`, `phases` (the number reached), `is_fallen` and Tandem's `seed`.
 
     Args:
-        task: A task's id.
+        task: Id of a task.
 
-    The rest is as in `gym_tandem.Options`; with `look_every`, pictures stay what they were in between, and take no memory.
+    The other arguments are those of `gym_tandem.Options`. With `look_every`, images in between are reused, and take no memory.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ def _largest_step(name: str, width: float) -> float:
         return _FINGER_STEP_RAD
     if name.endswith("_joint_rad"):
         return _ARM_STEP_RAD
-    # Velocities are told at once, and the base controller takes its time; poses have no limit for each number.
+    # Velocities are commanded at once, and the base controller follows them gradually; poses have no limit for each number.
     return _HEIGHT_STEP_M if name.endswith("pelvis_height_m") else width
 
 
@@ -193,12 +193,12 @@ class _Phases:
 
 
 def tandem_phases() -> _Phases:
-    """How many phases of its task an episode reached, 0 to 3."""
+    """Scores an episode by the number of phases reached, 0 to 3."""
     return _Phases()
 
 
 def tandem_task(task: str = "handover", seeds: str | int = "2000-2009") -> Task:
-    """A task's episodes: a scene for each of the seeds, which are one, or a range with both ends. 0 to 100 are for results."""
+    """Returns a task's episodes, a scene for each seed: `seeds` is one, or a range with both ends. 0 to 100 are for results."""
     told = _told(task)
     first, _, last = str(seeds).partition("-")
     if not first.isdigit() or not (last.isdigit() or not last) or int(last or first) < int(first):

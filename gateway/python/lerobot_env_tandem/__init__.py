@@ -22,8 +22,8 @@ from tandem.rows import ACTION, DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, IMAGES, S
 class TandemEnvConfig(EnvConfig):
     """Description of a task for `lerobot-eval` and `lerobot-train`; options are those of `gym_tandem.Options`.
 
-    Rate and size of pictures are by default those of `tandem export lerobot`. With `data_set`, whatever differs from the rows
-    of the data set is refused.
+    Rate and image size are by default those of `tandem export lerobot`. With `data_set`, any difference from the rows of the
+    data set is refused.
     """
 
     task: str | None = "Handover-v0"

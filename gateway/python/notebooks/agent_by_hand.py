@@ -13,8 +13,9 @@
 # %% [markdown]
 # # An agent by hand
 #
-# What a language model does in an episode, done by hand: look, measure, reach, close a hand, look
-# again. It is Handover's first phase: robot A has to hold the bottle 3 cm above where it stood.
+# The steps of a language model in an episode, done by hand: observe, measure, reach, close a hand,
+# observe again. The example is Handover's first phase: robot A has to hold the bottle 3 cm above
+# its initial place.
 
 # %%
 import matplotlib.pyplot as plt
@@ -28,7 +29,7 @@ print(episode.start().instruction)
 # %% [markdown]
 # ## Look
 #
-# The bottle is what is green, and it stands before A's right hand.
+# The bottle is the green object in front of A's right hand.
 
 # %%
 seen = episode.observe(["A"])
@@ -40,9 +41,9 @@ plt.show()
 # %% [markdown]
 # ## Measure
 #
-# `query_depth` finds a surface by its colour and says where it is, in A's pelvis frame. Where that
-# is upright and round, it has an axis. What is green is the bottle's body; the counter is where it
-# ends below.
+# `query_depth` finds a surface by its colour and returns its place in A's pelvis frame. An upright,
+# round surface has an axis. The green surface is the bottle's body, whose lower end is at the
+# counter.
 
 # %%
 body = episode.query_depth("A", surface=tandem.SurfaceQuery(color="green")).surfaces[0]
@@ -56,9 +57,9 @@ print(f"the bottle's axis: x {x:.3f} m, y {y:.3f} m; radius {body.axis.radius_m:
 # %% [markdown]
 # ## Reach
 #
-# The briefing knows grips that work. That of a bottle says where its axis has to lie in the wrist's
-# frame (`place_m`), how far beside it the hand comes first (`stops_m`), and how fingers are opened
-# and closed. `check_reach` tells beforehand, at no cost, whether an arm gets there.
+# The briefing contains grips that work. The grip of a bottle gives the place of the bottle's axis
+# in the wrist's frame (`place_m`), the hand's stops beside the bottle (`stops_m`), and the angles
+# of open and closed fingers. `check_reach` predicts, at no cost, whether an arm reaches a pose.
 
 # %%
 grip = next(grip for grip in episode.briefing.brief.grips if "bottle" in grip.thing)
@@ -66,7 +67,7 @@ print(f"{grip.thing}: {grip.place} at {grip.place_m} in the wrist's frame")
 
 GRASP_HEIGHT_M = 0.07
 axis = np.array([x, y, counter_z + GRASP_HEIGHT_M])
-# With this quaternion the wrist's axes are those of the pelvis, so that nothing has to be turned.
+# With this quaternion the wrist's axes are those of the pelvis, so that no rotation is needed.
 assert grip.right_quaternion_wxyz == (1.0, 0.0, 0.0, 0.0)
 around = axis - np.array(grip.place_m)
 beside = around - np.array(grip.stops_m[0])
@@ -96,15 +97,15 @@ for position in (beside + np.array([-0.10, 0.0, 0.10]), beside, around):
 # %% [markdown]
 # ## Close the hand
 #
-# A hand holds something while its thumb presses from one side, and fingers or palm from the other.
-# The reply says so.
+# A hand holds an object while its thumb presses from one side, and fingers or palm from the other.
+# The reply reports this.
 
 # %%
 held = move(around, grip.close_rad).robots[0].right
 print("grip:", held.grip)
 
 # %% [markdown]
-# ## Lift, and look again
+# ## Lift, and observe again
 
 # %%
 reply = move(around + np.array([0.0, 0.0, 0.10]), grip.close_rad)
@@ -124,6 +125,6 @@ result = episode.finish()
 print(result.phases, f"{result.env_steps} steps, {result.tool_calls} calls")
 
 # %% [markdown]
-# What is left is B's: its hand comes to the upper half, closes, A opens and leaves, and B stands
-# the bottle on the target, which lies between them. `tandem agent` has a language model do all
-# that; this is what it calls.
+# The rest is B's part. Its hand comes to the upper half of the bottle and closes. A opens its hand
+# and withdraws it, and B stands the bottle on the target between the robots. `tandem agent` lets a
+# language model do all of this with the same calls.

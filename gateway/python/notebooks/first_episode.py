@@ -13,9 +13,9 @@
 # %% [markdown]
 # # A first episode
 #
-# Two robots stand at a kitchen counter. Robot A is to lift a bottle, hand it to B, and B is to
-# stand it on a target. Here you begin that episode, look through the robots' eyes, move a hand, and
-# go back in time.
+# Two robots stand at a kitchen counter. Robot A is to lift a bottle and hand it to B, and B is to
+# stand it on a target. Here you begin that episode, look through the robots' cameras, move a hand,
+# and return to an earlier state.
 
 # %%
 import matplotlib.pyplot as plt
@@ -30,8 +30,8 @@ print(briefing.instruction)
 # %% [markdown]
 # ## What the robots see
 #
-# `observe` draws what each robot's head camera sees, 320 by 240 pixels, and reads what it senses.
-# Physics stands still meanwhile, and however long you think.
+# `observe` renders the image of each robot's head camera, 320 by 240 pixels, and reads the robot's
+# sensors. Physics is paused meanwhile, and while you think.
 
 # %%
 seen = episode.observe()
@@ -55,9 +55,9 @@ print("numbers of a state:", episode.state().shape, "as", episode.state_columns[
 # %% [markdown]
 # ## Moving a hand
 #
-# `move_wrists` takes hands to poses in a straight line, and 25 steps, half a second, are the most
-# for one command. Its reply says where they came to, and what is left of the budget. The hand goes
-# up and to the side here; the first command brings it near, the second has it arrive.
+# `move_wrists` moves hands to poses in a straight line. A command has at most 25 steps, which are
+# half a second. Its reply contains the resulting poses and the remaining budget. Here the hand goes
+# up and to the side: the first command brings it near its target, and the second one to it.
 
 # %%
 before = episode.snapshot()
@@ -81,8 +81,8 @@ plt.show()
 # %% [markdown]
 # ## The same again
 #
-# An episode goes back to a snapshot, and the same commands lead to the same state, bit for bit:
-# that is what `state_hash` says.
+# An episode returns to a snapshot, and the same commands lead to the same state, bit for bit.
+# `state_hash` shows that.
 
 # %%
 hash_then = episode.state_hash
@@ -95,7 +95,7 @@ print(episode.state_hash)
 # %% [markdown]
 # ## The end
 #
-# A result says which phases were reached. Nobody has lifted the bottle, so none was.
+# A result lists the phases that were reached. Nobody has lifted the bottle, so there are none.
 
 # %%
 result = episode.finish()

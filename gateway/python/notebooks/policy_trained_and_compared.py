@@ -13,11 +13,11 @@
 # %% [markdown]
 # # A policy trained and compared
 #
-# Experts see where things are; a policy sees pictures. Here an expert shows Handover a few times, a
-# small policy learns from that, plays seeds that it has never seen, and is compared with the expert
-# and with its floor: what one demonstration reaches that is replayed blindly. With eight
-# demonstrations and 200 steps it has only begun to learn; the book's page on baselines has what
-# more of both gives.
+# Experts see object poses; a policy sees images. Here an expert demonstrates Handover a few times,
+# and a small policy learns from that. The policy then plays unseen seeds, and is compared with the
+# expert and with the floor, which is the result of a blind replay of one demonstration. With eight
+# demonstrations and 200 steps the policy has only begun to learn. The book's page on baselines has
+# results with more of both.
 #
 # It needs `pip install "./gateway/python[baselines,notebook]"`.
 
@@ -50,8 +50,8 @@ def run(*arguments):
 # %% [markdown]
 # ## Demonstrations
 #
-# What robots are told is disturbed a little as they do it, and the label is what the expert told: so
-# the policy learns how it goes on from beside the way.
+# Commands are slightly disturbed before the robots execute them, and the label is the expert's own
+# command. So the policy learns to return from states beside the expert's path.
 
 # %%
 benchmark = ["--protocol", "benchmark", "--tasks", "handover"]
@@ -64,7 +64,8 @@ print(exported.episodes, "episodes,", exported.rows, "moments")
 # %% [markdown]
 # ## Training
 #
-# A step takes 8 moments; the second task is to tell from a picture where the objects are.
+# Each training step uses 8 moments. The second task is to predict the positions of the objects from
+# an image.
 
 # %%
 folder = train(runs / "data", runs / "policy", TrainingSettings(steps=200, batch=8))
@@ -78,10 +79,10 @@ axis.legend()
 plt.show()
 
 # %% [markdown]
-# ## What it tells for a moment of the data
+# ## The prediction for a moment of the data
 #
-# On the left what A sees, on the right the elbow of its right arm over the next second: as the expert
-# told it, and as the policy does.
+# On the left is A's image. On the right is the elbow of its right arm over the next second, as
+# commanded by the expert and by the policy.
 
 # %%
 policy = load(folder)
@@ -104,7 +105,7 @@ plt.show()
 # %% [markdown]
 # ## Playing
 #
-# The policy answers at an address of this process, and `tandem evaluate` asks it, as it asks any
+# The policy is served at an address of this process, and `tandem evaluate` queries it like any
 # policy behind a server. The floor replays one demonstration on the same seeds.
 
 # %%

@@ -13,9 +13,9 @@
 # %% [markdown]
 # # Record, look and score
 #
-# An episode leaves a recording with everything in it: what robots sensed and were told, where
-# things were, who touched what. Here an expert plays one, which is looked at; then a policy of your
-# own is scored beside it.
+# An episode leaves a recording with everything in it: sensor values and commands of the robots,
+# poses of the objects, and contacts. Here an expert plays an episode, which is then analysed. After
+# that a policy of your own is scored beside it.
 
 # %%
 from pathlib import Path
@@ -30,7 +30,7 @@ shown = tandem.collect("handover", 2000, out=runs / "demonstrations", protocol="
 print(shown.results[0].phases)
 
 # %% [markdown]
-# ## What lies in a recording
+# ## The content of a recording
 #
 # Every array begins with the state before the first step; 50 steps are a second.
 
@@ -43,13 +43,13 @@ for phase in recording.phases:
     print(f"{phase.number} {phase.id} at {phase.time_s:.2f} s")
 
 # %% [markdown]
-# ## How high the bottle is, and who presses on it
+# ## The height of the bottle, and the forces on it
 
 # %%
 bottle = recording.objects.index("bottle")
 RIGHT = 1
 height_m = recording.objects_in_world[:, bottle, 2] - recording.objects_in_world[0, bottle, 2]
-# Sums of what thumb, fingers and palm press with.
+# Sums of the forces of thumb, fingers and palm.
 pressed_n = np.linalg.norm(recording.contact_force_n[:, :, RIGHT, bottle], axis=-1).sum(axis=-1)
 figure, (above, below) = plt.subplots(2, 1, figsize=(9, 5), sharex=True)
 above.plot(recording.time_s, height_m)
@@ -67,7 +67,7 @@ plt.show()
 # %% [markdown]
 # ## Looking at it
 #
-# Pictures need not be recorded: any camera draws any step afterwards, in any size. These are the
+# Images need not be recorded: any camera can render any step afterwards, in any size. These are the
 # moments at which phases were reached.
 
 # %%
@@ -83,9 +83,9 @@ plt.show()
 # %% [markdown]
 # ## Scoring
 #
-# A policy is any function that is given an episode as it begins. This one has A's right hand lifted
-# and no more. `evaluate` plays it on several seeds, `collect` has shown what the expert does on
-# one, and `report` puts both in one table.
+# A policy is any function that receives each episode as it begins. This one only lifts A's right
+# hand. `evaluate` plays it on several seeds. `collect` has recorded the expert on one seed, and
+# `report` puts both in one table.
 
 
 # %%

@@ -29,14 +29,14 @@ _IDLE_S = 3600.0
 
 
 class TandemAction(Action):
-    """A call of one of Tandem's tools, as its book has them."""
+    """A call of one of Tandem's tools, which the book describes."""
 
     tool: str = Field(description='The name of a tool, as "observe", "move_wrists" or "send_joint_chunk".')
     arguments: dict[str, Any] = Field(default_factory=dict[str, Any], description="Its arguments.")
 
 
 class TandemObservation(Observation):
-    """What the tool answered, or why it did not. At a reset, what a policy has to know of the episode.
+    """Reply of the tool, or the reason for a refusal. At a reset, the briefing of the episode.
 
     The reward of a call is the number of phases that it reached, so that a whole episode gives at most 3.
     """
@@ -47,7 +47,7 @@ class TandemObservation(Observation):
 
 
 class TandemState(State):
-    """How far the episode is; `step_count` are control steps of 20 ms."""
+    """State of the episode; `step_count` is the number of control steps of 20 ms."""
 
     task: str | None = None
     seed: int | None = None
@@ -56,9 +56,9 @@ class TandemState(State):
 
 
 class TandemEnvironment(Environment[TandemAction, TandemObservation, TandemState]):
-    """One episode after the other. `reset` takes `task`, `seed`, `protocol` ("agentic" or "benchmark") and `assistance` ("full"
-    or "paper"); with "paper" phases are told, and rewarded, when the episode ends. Without a seed it is that after the last
-    one, at first 2000: 0 to 100 are for results.
+    """Environment of one episode after another. `reset` takes `task`, `seed`, `protocol` ("agentic" or "benchmark") and
+    `assistance` ("full" or "paper"). With "paper", phases are reported and rewarded when the episode ends. Without a seed,
+    the episode has the seed after the last one, at first 2000: 0 to 100 are for results.
     """
 
     SUPPORTS_CONCURRENT_SESSIONS = True
@@ -82,7 +82,7 @@ class TandemEnvironment(Environment[TandemAction, TandemObservation, TandemState
         if unknown:
             raise ValueError(f"no setting {', '.join(unknown)}; have: task, seed, protocol, assistance")
         begun = self._next_seed if seed is None else seed
-        # What cannot be begun leaves the running episode as it is.
+        # A failed start leaves the running episode unchanged.
         episode = tandem.Episode(task, begun, protocol=protocol, assistance=assistance)
         briefing = episode.start()
         self.close()
@@ -100,7 +100,7 @@ class TandemEnvironment(Environment[TandemAction, TandemObservation, TandemState
             reply = self._episode.call(action.tool, action.arguments)
         except tandem.TandemError as error:
             problem = str(error)
-        # Replies to reads, and with "paper" all replies, do not tell phases; that to `finish` tells when each was reached.
+        # Replies to observations, and with "paper" all replies, do not report phases. The reply to `finish` has their times.
         reached: Any = reply["phases"] if reply is not None and "phases" in reply else None
         phases = len(cast("list[Any]", reached)) if isinstance(reached, list) else self._state.phases
         if self._episode.ended is not None and self._result is None:
@@ -131,7 +131,7 @@ class TandemEnvironment(Environment[TandemAction, TandemObservation, TandemState
 
 
 class TandemClient(EnvClient[TandemAction, TandemObservation, TandemState]):
-    """A session of a server's own, with one episode at a time."""
+    """Creates a session of the server, with one episode at a time."""
 
     def _step_payload(self, action: TandemAction) -> dict[str, Any]:
         return action.model_dump()

@@ -131,8 +131,8 @@ impl NativeRecording {
         shaped(py, &setpoints, [self.steps.len(), blocks, JOINTS]).map(Some)
     }
 
-    /// Returns the grip of each hand of each robot on each object at every step, as the scorer sees it: 0
-    /// none, 1 touching, 2 holding.
+    /// Returns the grip of each hand of each robot on each object at every step, as in the scoring: 0 none, 1
+    /// touching, 2 holding.
     fn grips<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<u8>>> {
         let grips = py.detach(|| self.all_grips()).map_err(|error| failed(py, &error))?;
         let (robots, objects) =
@@ -158,7 +158,7 @@ impl NativeRecording {
         Ok((shaped(py, &rgb, [height, width, 3])?, shaped(py, &depth_m, [height, width])?))
     }
 
-    /// Renders only the colours, as a policy gets them that requests this size.
+    /// Renders only the colours, like the image of a policy that requests this size.
     fn colours<'py>(
         &self,
         py: Python<'py>,
@@ -214,8 +214,7 @@ impl NativeRecording {
         drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))
     }
 
-    /// Returns grips by step, robot, left and right hand, and object. Before the first step nothing is
-    /// gripped.
+    /// Returns grips by step, robot, left and right hand, and object. There is no grip before the first step.
     fn all_grips(&self) -> Result<Vec<u8>, RecordingError> {
         let Some(start) = self.steps.first() else { return Ok(Vec::new()) };
         let spec = &self.recording.spec;

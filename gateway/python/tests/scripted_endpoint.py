@@ -1,4 +1,4 @@
-"""A server of models that says what a script says, in the wire formats of OpenAI and Anthropic, and keeps what it was sent."""
+"""A server of models whose replies follow a script, in the wire formats of OpenAI and Anthropic. It stores the requests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from openai.types.chat.completion_create_params import CompletionCreateParamsNon
 from openai.types.responses.response_create_params import ResponseCreateParamsNonStreaming
 from pydantic import TypeAdapter
 
-# What the SDKs take themselves, as their makers describe it.
+# Types that the SDKs accept, by their own descriptions.
 BODIES: dict[str, TypeAdapter[Any]] = {
     "/v1/chat/completions": TypeAdapter(CompletionCreateParamsNonStreaming),
     "/v1/responses": TypeAdapter(ResponseCreateParamsNonStreaming),
@@ -26,36 +26,36 @@ BODIES: dict[str, TypeAdapter[Any]] = {
 PNG = b"\x89PNG\r\n\x1a\n"
 
 INPUT_TOKENS, CACHED_TOKENS, OUTPUT_TOKENS = 1000, 400, 50
-"""What every reply says that it took."""
+"""Token usage in every reply."""
 
 
 BESIDE: dict[str, Any] = {"extra_content": {"google": {"thought_signature": "signed"}}}
-"""What the server of Chat Completions puts beside each call and wants back, as that of Gemini does."""
+"""Extra field of each call that the server of Chat Completions requires back, like Gemini's."""
 
 
 @dataclass(frozen=True)
 class Says:
-    """A reply of the scripted model: words, and tools with their arguments; a text stands for arguments as it is."""
+    """A reply of the scripted model: a text, and tools with their arguments. Arguments given as a text are sent unchanged."""
 
     words: str = ""
     calls: tuple[tuple[str, dict[str, Any] | str], ...] = ()
     thoughts: str = ""
     cut: bool = False
     refusal: str = ""
-    """Words with which the model refuses."""
+    """Text of the model's refusal."""
     filtered: bool = False
-    """Whether a filter holds the reply back, where the format has such."""
+    """True if a filter withholds the reply, in formats with filters."""
 
 
 @dataclass(frozen=True)
 class Heard:
-    """What the scripted model was answered to a call."""
+    """The answer to a call of the scripted model."""
 
     call_id: str
     text: str
     pictures: int
     refused: bool | None
-    """None where the format does not say it."""
+    """None if the format does not contain it."""
 
 
 Script: TypeAlias = Generator[Says, list[Heard], None]
@@ -63,7 +63,7 @@ Script: TypeAlias = Generator[Says, list[Heard], None]
 
 @dataclass(frozen=True)
 class Refusal:
-    """A status in place of a reply."""
+    """A status that replaces a reply."""
 
     status: int
     message: str
@@ -72,7 +72,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Request:
-    """What was sent."""
+    """The requests."""
 
     path: str
     body: dict[str, Any]
@@ -83,17 +83,17 @@ class Request:
 
 @dataclass
 class Conversation:
-    """A script that is being said."""
+    """A script during its conversation."""
 
     script: Script
     began: bool = False
     sent_ids: list[str] = field(default_factory=list[str])
     latest: tuple[dict[str, Any], dict[str, Any]] | None = None
-    """The latest request and its reply, which is given again to who asks the same again."""
+    """The latest request and its reply, which is repeated if the request is."""
 
 
 class ScriptedEndpoint:
-    """The server; each conversation, told by its instructions, has a script of its own.
+    """The server. Each conversation has its own script; its instructions identify it.
 
     refusals: What is answered first, one a request.
     unknown: Fields that are refused, as an older server does.
@@ -118,11 +118,11 @@ class ScriptedEndpoint:
         self._server.server_close()
 
     def restart(self) -> None:
-        """Forgets what was said."""
+        """Forgets all conversations."""
         self._conversations.clear()
 
     def base_url(self, api: str) -> str:
-        """The address that an SDK is given."""
+        """The address for an SDK."""
         root = f"http://127.0.0.1:{self._server.server_port}"
         return root if api == "anthropic" else f"{root}/v1"
 
@@ -167,7 +167,7 @@ class ScriptedEndpoint:
                         self.path, body, {name.lower(): value for name, value in self.headers.items()}
                     )
                 except Exception as error:
-                    # No status that an SDK asks again after.
+                    # This is not a status after which an SDK repeats its request.
                     status, reply = 418, {"error": {"message": f"{type(error).__name__}: {error}", "type": "test"}}
                 content = json.dumps(reply).encode()
                 self.send_response(status)
@@ -184,7 +184,7 @@ class ScriptedEndpoint:
 
 
 def check_all(value: Any) -> None:
-    """Has what is checked lazily checked, as pydantic does it with what can be gone through."""
+    """Checks values that pydantic checks lazily, such as iterables."""
     if isinstance(value, dict):
         for each in cast("dict[str, Any]", value).values():
             check_all(each)
@@ -203,7 +203,7 @@ def _error(path: str, refusal: Refusal) -> dict[str, Any]:
 
 
 def _count_pictures(value: Any) -> int:
-    """Pictures anywhere in a body, each of which has to be a PNG file."""
+    """Images anywhere in a body. Each has to be a PNG file."""
     if isinstance(value, dict):
         fields = cast("dict[str, Any]", value)
         if fields.get("type") in ("image", "input_image", "image_url"):

@@ -20,7 +20,7 @@ from tandem.agent import main
 
 APIS = ("openai", "openai-chat", "anthropic")
 KEY = "sk-test-0123456789abcdef"
-# Not where the sources lie, which Python would take for the package.
+# The folder of the sources is avoided, because Python would import it as the package.
 AWAY = Path(__file__).parent
 SEED = 2000
 
@@ -34,13 +34,13 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(endpoint: ScriptedEndpoint, server: tandem.Server, api: str = "openai-chat", *flags: str) -> int:
-    """Plays an episode of Handover on the server, as the command line does."""
+    """Plays an episode of Handover on the server, like the command line."""
     where = ["--api", api, "--base-url", endpoint.base_url(api), "--url", server.url]
     return main(["--model", "scripted", *where, "--task", "handover", "--seed", str(SEED), *flags])
 
 
 def result(runs: Path) -> dict[str, Any]:
-    """That of the latest episode."""
+    """The folder of the latest episode."""
     latest = max(runs.glob("handover-*/result.json"), key=lambda path: path.stat().st_mtime_ns)
     return json.loads(latest.read_text())
 
@@ -50,7 +50,7 @@ def observe(robot: str = "A") -> tuple[str, dict[str, Any]]:
 
 
 def saying(*said: Says) -> Callable[[str], Script]:
-    """A script that heeds nothing that it hears."""
+    """A script that ignores all answers."""
 
     def script(_: str) -> Script:
         for says in said:
@@ -60,7 +60,7 @@ def saying(*said: Says) -> Callable[[str], Script]:
 
 
 class Grasp:
-    """Takes the bottle and lifts it, as the brief says how, where it sees it; keeps what it heard."""
+    """Takes the bottle at the place where it sees it, and lifts it, by the advice of the brief. Stores the answers."""
 
     def __init__(self) -> None:
         self.heard: list[list[Heard]] = []
@@ -72,7 +72,7 @@ class Grasp:
         heard = yield Says(calls=(("query_depth", {"robot": "A", "surface": {"color": "green"}}),))
         self.heard.append(heard)
         x, y, z = json.loads(heard[0].text)["surfaces"][0]["centroid_m"]
-        # What is seen is the side that faces the camera, at 0.1 m; the axis is 20 mm behind it.
+        # The camera sees the near side, at 0.1 m; the axis is 20 mm behind it.
         away = math.hypot(x - 0.1, y)
         x, y, z = x + 0.02 * (x - 0.1) / away, y + 0.02 * y / away, z - 0.06
         opened, closed = [0, 0.3, 0, 0, 0, 0, 0], [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]

@@ -1,4 +1,4 @@
-"""Policies that learn from demonstrations, in small: what they read, how they learn, and the whole way to a report."""
+"""Small tests of policies that learn from demonstrations: their inputs, their training, and all steps to a report."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def torch() -> Any:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two episodes in which both robots walk, and turn, each its own way."""
+    """Two episodes in which both robots walk and turn in different ways."""
     folder = tmp_path_factory.mktemp("runs")
     for seed in (2010, 2011):
         with tandem.Episode("handover", seed, protocol="benchmark", record=folder / f"handover-{seed}") as episode:
@@ -77,7 +77,7 @@ def test_moments_are_what_the_recordings_hold(runs: Path, data_set: Path) -> Non
             pelvis = recording.pelvis_in_world[step, robot]
             offset = recording.objects_in_world[step, :, :3] - pelvis[:3]
             assert np.allclose(read_all.objects_in_pelvis_m[moment, robot], offset @ rotation(pelvis[3:]), atol=1e-5)
-    # Behind the end the last row goes on, but was not told; no chunk reaches into another episode.
+    # After the end the last row is repeated and marked as padding. No chunk extends into another episode.
     assert read_all.told[8].tolist() == [True, False, False, False] and read_all.told[9].all()
     assert np.array_equal(read_all.chunks[8, 0], read_all.chunks[8, 3])
     assert np.array_equal(read_all.chunks[9, 1], read_all.chunks[10, 0])
@@ -157,7 +157,7 @@ def test_all_kinds_learn_and_answer(kind: PolicyKind, scope: Scope, sharing: Sha
         told: NDArray[np.float32] = baseline.act(demonstrations.pictures[3, robots], demonstrations.states[3, robots], robots)
         assert told.shape == (4, len(robots), 35)
         assert np.isfinite(told).all()
-        # What it was shown has hardly moved, so even a policy that has learned little tells nearly that.
+        # The joints in the demonstrations hardly move, so even a policy that has learned little predicts about the same.
         assert np.abs(told - demonstrations.chunks[3][:, robots]).mean() < 0.2
     assert len(policy["networks"]) == (1 if sharing == "shared" else 2)
 

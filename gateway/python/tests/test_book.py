@@ -1,4 +1,4 @@
-"""What the book and the package's README show runs."""
+"""Tests that run the code of the book and of the package's README."""
 
 from __future__ import annotations
 

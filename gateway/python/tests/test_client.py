@@ -1,4 +1,4 @@
-"""Connections that a model's thinking outlives, and those that are gone when it has thought."""
+"""Connections that a server closes while a model thinks, and connections that stay open."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OK = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 2\r\
 
 
 class Flaky:
-    """A server that closes connections when it likes.
+    """A server that closes connections at chosen moments.
 
     answers: For each request of a connection, in turn, what it is answered with, or whether; behind the last one the
         connection is closed.
@@ -39,13 +39,13 @@ class Flaky:
         self.url = f"http://127.0.0.1:{self._port}"
 
     def open(self) -> None:
-        """Listens, where it has listened before."""
+        """Listens again at the same address."""
         self._listener = socket.create_server(("127.0.0.1", self._port))
         self._port = self._listener.getsockname()[1]
         threading.Thread(target=self._serve, args=(self._listener,), daemon=True).start()
 
     def close(self) -> None:
-        """Listens no more."""
+        """Stops listening."""
         self._listener.close()
 
     def _serve(self, listener: socket.socket) -> None:
@@ -59,7 +59,7 @@ class Flaky:
 
 
 def _read(lines: Any) -> tuple[str, str | None]:
-    """The line of a request, and its key."""
+    """Returns the first line of a request, and its key."""
     first, key, length = lines.readline().decode().rsplit(" ", 1)[0], None, 0
     while line := lines.readline().decode().strip():
         name, _, value = line.partition(": ")
@@ -70,12 +70,12 @@ def _read(lines: Any) -> tuple[str, str | None]:
 
 
 def test_a_connection_that_is_gone_is_opened_anew() -> None:
-    """Whatever is asked: the server has closed it before."""
+    """Tests any request on a connection that the server has closed."""
     server = Flaky([True], [True], [True])
     client = tandem.Client(server.url)
     for method, path in (("GET", "/v1/tasks"), ("DELETE", "/v1/episodes/x"), ("POST", "/v1/episodes/x/notes")):
         client.request(method, path)
-        # What the server has closed is known here a moment later.
+        # The client notices a closed connection a moment later.
         time.sleep(0.2)
     assert [line for line, _ in server.requests] == ["GET /v1/tasks", "DELETE /v1/episodes/x", "POST /v1/episodes/x/notes"]
 
@@ -106,7 +106,7 @@ def test_every_call_has_a_key_of_its_own() -> None:
 
 
 def test_a_server_that_is_started_again_is_waited_for() -> None:
-    """And one that has never answered is not."""
+    """Tests also a server that has never answered, for which the client does not wait."""
     server = Flaky([True])
     client = tandem.Client(server.url)
     client.request("GET", "/v1/tasks")
@@ -151,7 +151,7 @@ def server(tmp_path: Path) -> Iterator[tandem.Server]:
 def test_connections_outlive_a_long_thought(
     server: tandem.Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A client, an agent and a WebSocket, side by side, so that the wait is one."""
+    """Tests a client, an agent and a WebSocket at the same time, so that the test waits only once."""
     monkeypatch.setenv("OPENAI_API_KEY", "sk-test-0123456789abcdef")
     failures: list[BaseException] = []
 
@@ -193,7 +193,7 @@ def _agent(server: tandem.Server) -> None:
 
 
 def _web_socket(server: tandem.Server) -> None:
-    """A person's socket, silent for as long, answers a ping."""
+    """Tests that a person's socket answers a ping after the same silence."""
     host = tandem.Client(server.url)
     start = host.request("POST", "/v1/episodes", {"task": "handover", "seed": 2002, "operators": "per_robot"})
     token = start["operators"][0]["token"]

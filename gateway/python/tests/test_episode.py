@@ -19,7 +19,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tandem.Server]:
 
 
 def told(briefing: tandem.Briefing) -> tuple[object, ...]:
-    """What a start says, but for the policy's clock, which runs."""
+    """The reply to a start, without the policy's clock, which runs."""
     return briefing.instructions, briefing.robots, briefing.kinds, briefing.brief, briefing.status.state_hash
 
 

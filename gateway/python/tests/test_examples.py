@@ -1,4 +1,4 @@
-"""Examples for learners run, in small."""
+"""Small runs of the examples for learners."""
 
 from __future__ import annotations
 
@@ -22,5 +22,5 @@ def test_a_hand_begins_to_learn(tmp_path: Path) -> None:
     with (tmp_path / "curve.csv").open() as file:
         rollouts = list(csv.DictReader(file))
     assert [row["decisions"] for row in rollouts] == ["128", "256"]
-    # Episodes are as long as they are said to be, and nothing beyond the first phase is rewarded.
+    # Episodes have the configured length, and only the first phase is rewarded.
     assert all(int(row["episodes"]) >= 6 and float(row["mean_return"]) <= 1 for row in rollouts)

@@ -1,4 +1,4 @@
-"""Data sets of recordings, read by libraries that others wrote."""
+"""Data sets of recordings, read by independent libraries."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ EYES = "observation.images.A"
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two episodes, of which nobody reached the end; the second is marked good."""
+    """Two episodes that do not reach the last phase. The second is marked good."""
     folder = tmp_path_factory.mktemp("runs")
     for seed, steps in ((2010, 23), (2011, 40)):
         own = folder / f"handover-{seed}"
@@ -84,7 +84,7 @@ def test_rows_are_what_the_recording_holds(runs: Path, whole: Path) -> None:
     assert rows["index"].tolist() == list(range(13))
     second = tandem.Recording(runs / "handover-2011")
     assert np.array_equal(rows["observation.state"][7], np.ravel(second.states[10]))
-    # Joint targets are those of the step at which the next row begins, and velocities the mean until then.
+    # Joint targets are those of the step at which the next row begins; velocities are the mean until that step.
     names = info["features"]["action"]["names"]
     told = dict(zip(names, rows["action"][7], strict=True))
     joint = second.action_columns.index("waist_yaw_joint_rad")
@@ -259,7 +259,7 @@ def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path:
         name = {"episode_chunk": 0, "episode_index": number, "video_key": EYES}
         table = parquet.read_table(exported.folder / info["data_path"].format(**name))
         assert table["index"].to_pylist() == list(range(number * 5, number * 5 + length))
-        # Programs that read this version have a `datasets` before 4.0, which knows no "List".
+        # Programs that read this version have a `datasets` before 4.0, which does not know "List".
         assert json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]["action"]["_type"] == "Sequence"
         assert np.array_equal(np.array(table["action"].to_pylist()), rows["action"][rows["episode_index"] == number])
         with av.open(str(exported.folder / info["video_path"].format(**name))) as container:
@@ -342,7 +342,7 @@ def test_order_and_splits(tmp_path: Path) -> None:
     (chosen / "one").symlink_to(tmp_path / "task-9")
     (chosen / "other").symlink_to(tmp_path / "task-9")
     assert [path.parent.name for path in find(chosen)] == ["one"]
-    # Links that lead back, or to what is there anyway, add nothing.
+    # Links that lead back, or to exported files, add no files.
     (tmp_path / "latest").symlink_to(".")
     (chosen / "up").symlink_to(tmp_path)
     assert [path.parent.name for path in find(tmp_path)] == ["b-1", "task-9", "task-10"]
@@ -359,7 +359,7 @@ def test_episodes_are_told_in_their_own_words(tmp_path: Path) -> None:
         )
     recording = tandem.Recording(tmp_path / "out-2011/episodes/handover-2011")
     assert recording.instruction == words["handover"]["joint"] and recording.instructions["B"] == "Nimm sie."
-    # Files are UTF-8 whatever the locale's encoding is.
+    # Files are UTF-8 with any encoding of the locale.
     command = [sys.executable, "-m", "tandem.export", "lerobot", "--cameras=none", str(tmp_path), str(tmp_path / "set")]
     ascii_only = {**os.environ, "LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     subprocess.run(command, cwd=tmp_path, check=True, env=ascii_only)

@@ -27,7 +27,7 @@ def test_the_checker_of_gymnasium_passes(name: str) -> None:
 
     env = make(name, obs_type="state")
     with warnings.catch_warnings():
-        # That joint limits are not -1 to 1 is said once more each time; everything else is an error.
+        # The warning that joint limits are not -1 to 1 is repeated each time. All other warnings are errors.
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", message=".*(symmetric|normalized|infinity).*")
         check_env(env.unwrapped, skip_render_check=True)
@@ -37,14 +37,14 @@ def test_the_checker_of_gymnasium_passes(name: str) -> None:
 
 
 def held(observation: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
-    """The action that keeps the robots about as they are."""
+    """The action that nearly keeps the robots in their present state."""
     action = np.zeros((len(observation["agent_pos"]) // 47, 35), np.float32)
     action[:, -1] = 0.74
     return action.ravel()
 
 
 def test_stress_is_laid_over_the_same_episode() -> None:
-    """Of the axis and level that are asked for; a level is 1 where nothing is said."""
+    """Stress of the requested axis and level. The level is 1 by default."""
 
     def begun(**settings: Any) -> tuple[str, str]:
         env = make("Handover", obs_type="state", **settings)
@@ -57,7 +57,7 @@ def test_stress_is_laid_over_the_same_episode() -> None:
     plain, said = begun()
     masses = [begun(stress="mass", **level)[0] for level in ({}, {"level": 1}, {"level": 3})]
     assert masses[0] == masses[1] and len({plain, *masses}) == 3
-    # Other words change nothing but what is told.
+    # Other wordings change only the instructions.
     for_words, in_words = begun(stress="words", level=3)
     assert for_words == plain and in_words != said
     with pytest.raises(Exception, match="expected one of `camera`"):
@@ -174,9 +174,9 @@ def test_what_an_expert_did_succeeds_step_for_step_and_is_rewarded(tmp_path: Pat
         assert env.state_hash() == recording.state_hashes[len(rewards)]
         reached_s = [0.02 * phases.index(phase) for phase in (1, 2, 3)]
         assert np.allclose(reached_s, list(result.phases.values()))
-        # All three phases, less what is near to the first before anything is done.
+        # All three phases, minus the initial progress towards the first.
         assert 2.5 < sum(rewards) < 3.0
-        # Rewards lead there: most of the way was come by before a phase was reached.
+        # Most rewards come before a phase is reached.
         before = sum(rewards[: phases.index(1) - 1])
         assert before > 0.2
         env.close()

@@ -1,4 +1,4 @@
-"""Harnesses of others: their own checks, and an episode of each. What is not installed here is left out."""
+"""Other projects' harnesses: their own checks, and an episode of each. Harnesses that are not installed are skipped."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIZE: dict[str, Any] = {"observation_width": 32, "observation_height": 24, "look
 
 
 def held(state: np.ndarray[Any, np.dtype[Any]], columns: list[str]) -> np.ndarray[Any, np.dtype[np.float32]]:
-    """The row that keeps the robots as they are, of a state that has all joints."""
+    """The row that keeps the robots in their present state, from a state with all joints."""
     names = [name for name in tandem._native.state_columns() if name.endswith("_joint_rad")] + columns[-4:]
     robots: np.ndarray[Any, np.dtype[Any]] = np.reshape(state, (2, -1))
     row = robots[:, [names.index(name) for name in columns]].astype(np.float32)
@@ -37,7 +37,7 @@ def test_vla_eval_plays_its_benchmark() -> None:
     assert {name: image.shape for name, image in first["images"].items()} == {"A": (24, 32, 3), "B": (24, 32, 3)}
     assert first["state"].shape == (94,) and first["states"] is first["state"]
     assert first["instructions"].keys() == {"A", "B"} and first["task_description"]
-    # The next episode is another, and the first one begins again as it did.
+    # The next episode is different, and the first one begins again in the same state.
     other = benchmark.reset({**task, "episode_idx": 1})
     assert not np.array_equal(other["pixels"]["A"], first["images"]["A"])
     again = benchmark.make_obs(benchmark.reset(task), task)
@@ -81,7 +81,7 @@ def test_inspect_robots_evaluates_episodes_by_their_seeds(tmp_path: Path) -> Non
     info = embodiment.info
 
     class Still(PolicyBase):
-        """Keeps the robots as it first sees them."""
+        """Keeps the robots in the first observed state."""
 
         info = PolicyInfo("still", embodiment.info.action_space, embodiment.info.observation_space, 50.0)
         began: list[Observation] = []  # noqa: RUF012

@@ -1,4 +1,4 @@
-"""Logs of Inspect, read by inspect-ai itself and compared with the conversations that they are made of."""
+"""Logs of Inspect, read by inspect-ai and compared with their source conversations."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_a_log_has_every_message_and_image(team: tuple[Path, EvalLog]) -> None:
         assert images == [f"data:image/png;base64,{picture}" for picture in pictures]
         assert len(images) == 1 and base64.b64decode(pictures[0]).startswith(PNG)
         assert any("You have called no tool" in message.text for message in messages if message.role == "user")
-    # Calls find their answers, although both models count theirs alike.
+    # Calls are matched with their answers, although both models use the same numbers.
     asked = [
         call.id for message in sample.messages if isinstance(message, ChatMessageAssistant) for call in message.tool_calls or []
     ]
@@ -166,7 +166,7 @@ def test_a_log_has_the_episodes_of_a_model_by_seed_and_epoch(tmp_path: Path) -> 
         gone = Refusal(401, "no such model")
         with ScriptedEndpoint(waiting, refusals=[gone]) as endpoint:
             assert single(endpoint, server, runs, SEED + 2) == 1
-        # The older half of a conversation is dropped again and again.
+        # The older half of a conversation is dropped repeatedly.
         with ScriptedEndpoint(waiting) as endpoint:
             assert single(endpoint, server, runs, SEED + 3, "--max-calls", "6", "--context-tokens", str(INPUT_TOKENS - 1)) == 0
     logs = exported(runs, tmp_path / "logs")
@@ -220,7 +220,7 @@ def test_a_model_that_reaches_a_phase_has_its_score(team: tuple[Path, EvalLog], 
 
 
 def test_files_of_format_1_are_exported(team: tuple[Path, EvalLog], tmp_path: Path) -> None:
-    """They have no settings, times and retries; the model is the one of the flags."""
+    """Tests logs without settings, times and retries. The model is the one of the flags."""
     folder = tmp_path / "runs" / team[0].name
     folder.mkdir(parents=True)
     (folder / "result.json").write_bytes((team[0] / "result.json").read_bytes())

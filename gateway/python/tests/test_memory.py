@@ -1,4 +1,4 @@
-"""What episodes leave in memory; `tests/peers/environments/memory.py` plays 1,000 of each kind."""
+"""Memory that episodes leave allocated; `tests/peers/environments/memory.py` plays 1,000 of each kind."""
 
 from __future__ import annotations
 

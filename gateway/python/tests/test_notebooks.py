@@ -13,7 +13,7 @@ NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.py"))
 
 NAMES = ("agent_by_hand", "first_episode", "policy_trained_and_compared", "record_look_score")
 
-# What a notebook needs beside what all of them do, and the extra that has it.
+# Additional package of a notebook, and the extra that contains it.
 FURTHER = {"policy_trained_and_compared": (("av", "pyarrow", "torch"), "baselines")}
 
 
@@ -27,7 +27,7 @@ def test_notebooks_run(path: Path, tmp_path: Path) -> None:
     jupytext: Any = import_module("jupytext")
     nbclient: Any = import_module("nbclient")
     notebook = jupytext.read(path)
-    # An exception in a cell is one here, with the cell and its traceback.
+    # An exception in a cell is raised here, with the cell and its traceback.
     nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 2

@@ -1,4 +1,4 @@
-"""A function as a policy that the program asks."""
+"""A function as a policy server for the program."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ NODE = {"num_cpus": 1, "object_store_memory": 100 << 20, "include_dashboard": Fa
 
 @pytest.fixture
 def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    # Processes of a cluster look where this one was started, and there the sources lie.
+    # Processes of a cluster search the folder in which this one was started, which contains the sources.
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
     cluster = import_module("ray.cluster_utils").Cluster(initialize_head=True, head_node_args=NODE)
@@ -43,7 +43,7 @@ def hashes(evaluation: tandem.Evaluation) -> dict[int | None, str | None]:
 
 
 def reported(folder: Path) -> list[Any]:
-    """What a report has to say, but for the time that policies took."""
+    """The expected contents of a report, without the times of policies."""
     told = json.loads(tandem.report(folder, format="json").read_text())["policies"]
     for task in (task for policy in told for task in policy["tasks"]):
         del task["effort"]["thought"]
@@ -92,7 +92,7 @@ def test_a_node_that_dies_loses_no_episode(cluster: Any, tmp_path: Path) -> None
     alone = tandem.evaluate(walk, "handover", SEEDS, protocol="benchmark", assistance="full", out=tmp_path / "alone")
     assert hashes(played) == hashes(alone)
     assert reported(out) == reported(tmp_path / "alone")
-    # What lies there is not played again, here or on the cluster.
+    # Episodes with a result in the folder are not played again, here or on the cluster.
     assert hashes(run(None)) == hashes(alone)
     assert len(lines(tmp_path / "begun")) == len(begun)
 

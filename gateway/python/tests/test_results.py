@@ -1,4 +1,4 @@
-"""What episodes leave: recordings, evaluations, reports; and the command line."""
+"""Results of episodes: recordings, evaluations, reports; and the command line."""
 
 from __future__ import annotations
 
@@ -280,7 +280,7 @@ def test_other_threads_run_while_physics_does() -> None:
 def test_the_command_line_is_whole(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     demo = subprocess.run(
         [sys.executable, "-m", "tandem", "demo", "--seeds", "2010", "--runs", str(tmp_path)],
-        # Not where the sources lie, which Python would take for the package.
+        # The folder of the sources is avoided, because Python would import it as the package.
         cwd=tmp_path,
         capture_output=True,
         text=True,

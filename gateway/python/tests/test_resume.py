@@ -1,4 +1,4 @@
-"""Language models whose agent is killed, and that go on in another process as if nothing had happened."""
+"""Language models whose agent is killed. They continue in another process without a difference."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tandem.agent.journal import LineFile
 
 APIS = ("openai", "openai-chat", "anthropic")
 KEY = "sk-test-0123456789abcdef"
-# Not where the sources lie, which Python would take for the package.
+# The folder of the sources is avoided, because Python would import it as the package.
 AWAY = Path(__file__).parent
 SEED = 2000
 
@@ -152,14 +152,14 @@ def told(endpoint: ScriptedEndpoint) -> list[str]:
 
 
 def summary(folder: Path) -> dict[str, Any]:
-    """What came of a play, however often it was taken up again."""
+    """The outcome of an episode after any number of resumptions."""
     came = result(folder)
     usage = {name: came["usage"][name] for name in ("input_tokens", "output_tokens", "cached_tokens", "endings", "models")}
     return {**{name: came[name] for name in ("ended", "env_steps", "tool_calls", "phases", "falls")}, "usage": usage}
 
 
 Unbroken: TypeAlias = Callable[[str], tuple[list[str], dict[str, Any], list[str]]]
-"""By API, the requests of a play that nobody breaks off, what came of it, and the tools that it called."""
+"""By API, the requests of an uninterrupted episode, its outcome, and the tools that it called."""
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def unbroken(server: tandem.Server, runs: Path) -> Unbroken:
 
 
 Moment: TypeAlias = tuple[int, str, str]
-"""With the n-th request whose path has this part, before or after the server gets it."""
+"""Moment of the kill: the n-th request whose path contains this part, before or after it reaches the server."""
 
 MOMENTS: dict[str, Moment] = {
     "before the first reply is told of": (1, "/notes", "before"),
@@ -196,7 +196,7 @@ MOMENTS: dict[str, Moment] = {
 
 
 def at(moment: Moment) -> Callable[[str], str]:
-    """Says whether the agent is killed with a request, as Relay asks."""
+    """Returns the function by which Relay decides whether a request kills the agent."""
     count, part, when = moment
     seen = iter(range(1, 1000))
     return lambda path: when if part in path and next(seen) == count else ""
@@ -258,7 +258,7 @@ def test_kills_at_any_moment_leave_the_play_as_it_was(server: tandem.Server, run
     draw = random.Random(SEED)
 
     def at_random(path: str) -> str:
-        # An episode that nobody knows of yet cannot be taken up.
+        # An episode cannot be resumed before anybody knows its id.
         return draw.choice(("before", "after", *[""] * 8)) if path.startswith("/v1/episodes/") else ""
 
     with ScriptedEndpoint(script) as endpoint, Relay(server.url, at_random) as relay:
@@ -277,7 +277,7 @@ def test_kills_at_any_moment_leave_the_play_as_it_was(server: tandem.Server, run
 
 
 class Pair:
-    """A script for each robot, which tells the other who it is; keeps what they heard."""
+    """A script for each robot, which sends its name to the other. Stores the messages."""
 
     def __init__(self) -> None:
         self.heard: list[str] = []
@@ -290,7 +290,7 @@ class Pair:
         yield Says(calls=(("finish", {}),))
 
     def check(self, folder: Path, endpoint: ScriptedEndpoint) -> None:
-        """Checks that all was done and heard once."""
+        """Checks that each call was executed and each message received once."""
         came = result(folder)
         assert (came["ended"], came["env_steps"], len(endpoint.requests)) == ("finished", 310, 6)
         said = ["I am A.", "I am B."]
@@ -316,7 +316,7 @@ def test_a_model_for_each_robot_is_taken_up_again(moment: Moment, server: tandem
 
 
 def break_off(command: list[str], endpoint: ScriptedEndpoint, runs: Path, killed: str) -> str:
-    """Starts an agent with a server of its own, kills the agent or both with the third reply, and returns their last words."""
+    """Starts an agent with its own server, kills the agent or both at the third reply, and returns their last output."""
     reply, asked = endpoint.answer, iter(range(1000))
 
     def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
@@ -419,7 +419,7 @@ def test_a_conversation_is_one_process_s(broken_off: Path, server: tandem.Server
 def test_limits_may_change_and_an_episode_that_has_ended_gives_its_result(
     broken_off: Path, server: tandem.Server, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # What a process was just writing when it was killed.
+    # The line that a process was writing when it was killed.
     with (broken_off / "agent.jsonl").open("a") as file:
         file.write('{"event":"replied","reply":{"wo')
     resume = ["--resume", str(broken_off), "--url", server.url]

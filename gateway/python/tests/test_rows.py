@@ -30,7 +30,7 @@ STATE_TOLERANCE_RAD = {50: 0.0, 25: 0.05, 10: 0.05}
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Handover, by the expert."""
+    """A recording of Handover's expert."""
     folder = tmp_path_factory.mktemp("rows") / "runs"
     asked = ["--tasks=handover", f"--seeds={SEED}", "--protocol=benchmark", "--no-reports", f"--out={folder}"]
     subprocess.run([sys.executable, "-m", "tandem", "collect", *asked], cwd=folder.parent, check=True)
@@ -81,7 +81,7 @@ def test_actions_of_a_data_set_lead_the_environment_through_its_observations(run
     of_joints = [column.unit == "rad" for column in env.contract.state]
     last = len(rows[ACTION]) - 1
     row = 0
-    # In the end it stands for up to a second, for a phase that has to be held.
+    # At the end the expert stands for up to a second, because the phase has to hold.
     for step in range(last + 1 + rate_hz):
         row = min(step, last)
         if step <= last:

@@ -1,4 +1,4 @@
-"""Teams of language models: a model of its own for each robot, with its own endpoint, prices and limits."""
+"""Teams of language models: each robot has its own model, with its own endpoint, prices and limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import tandem
 from tandem.agent import main
 from tandem.export.inspect_log import export_inspect
 
-# Not where the sources lie, which Python would take for the package.
+# The folder of the sources is avoided, because Python would import it as the package.
 AWAY = Path(__file__).parent
 SEED = 2000
 PRICE_A = "usd-per-million-input=10&usd-per-million-output=100&usd-per-million-cached=1"
@@ -60,7 +60,7 @@ def flags(common: ScriptedEndpoint, own: ScriptedEndpoint, options: str = "") ->
 
 
 def check_usage(usage: dict[str, Any], replies: tuple[int, int]) -> None:
-    """Each model is counted and priced by itself, and both in sum."""
+    """Tests that usage and costs are given for each model and in sum."""
     assert sorted(usage["models"]) == ["other", "scripted"]
     assert usage["input_tokens"] == sum(replies) * INPUT_TOKENS
     assert math.isclose(usage["usd"], replies[0] * USD_A + replies[1] * USD_B)
@@ -94,7 +94,7 @@ def test_each_robot_has_its_model_and_its_price(server: tandem.Server, runs: Pat
 
 
 def test_a_team_goes_on_with_the_same_models(server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The first process is killed while B's model thinks."""
+    """Kills the first process while B's model thinks."""
 
     def thinking(_: str) -> Script:
         yield Says(calls=(("wait", {"steps": 5}),))

@@ -13,7 +13,7 @@ import pytest
 
 PAGE = Path(__file__).parents[3] / "docs/src/tutorial.md"
 
-# Of disturbed demonstrations one in six fails and is not kept, wherever that happens to be.
+# One in six disturbed demonstrations fails and is not kept. Their seeds vary.
 SMALL = {
     "--seeds 2000-2099": "--seeds 2000-2004",
     "--seeds 1-100": "--seeds 2003",
@@ -35,7 +35,7 @@ def test_the_commands_run(tmp_path: Path) -> None:
         port = free.getsockname()[1]
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     for block in blocks:
-        # The last block does all of it again.
+        # The last block repeats all steps.
         if block.startswith("pip install") or " recipe " in block or ("tandem.baselines" in block and not learns):
             continue
         script = block.replace("8001", str(port))
@@ -43,7 +43,7 @@ def test_the_commands_run(tmp_path: Path) -> None:
             script = script.replace(large, small)
         if not learns:
             script = script.replace("runs/pouring/evaluation ", "")
-        # What a block has begun ends with it.
+        # Processes that a block has started end with the block.
         script = f"trap 'kill $(jobs -p) 2>/dev/null || true' EXIT\nset -e\n{script}"
         done = subprocess.run(
             ["bash", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False

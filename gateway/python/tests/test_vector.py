@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 gym = pytest.importorskip("gymnasium")
 
 FALLING = np.zeros((2, 35), np.float32)
-"""What nothing keeps on its feet."""
+"""Actions under which every robot falls."""
 FALLING[:, -4:] = -0.4, 0.4, 0.6, 0.4
 FALLING[:, [28, 30]] = 2.0, 0.5
 
@@ -62,7 +62,7 @@ def test_worlds_are_the_environments_one_by_one() -> None:
 
 
 def ends(envs: Any) -> tuple[list[int], dict[str, Any], Any]:
-    """Lets the robots of world 0 fall. Returns the seeds of the last step, its infos, and what was seen."""
+    """Lets the robots of world 0 fall. Returns the seeds of the last step, its infos, and the observations."""
     actions = standing(envs.num_envs)
     actions[0] = FALLING.ravel()
     for _ in range(400):
@@ -80,7 +80,7 @@ def test_the_next_episode_begins_in_the_next_step() -> None:
     seen, rewards, terminated, _, infos = envs.step(standing(2))
     assert (infos["seed"].tolist(), rewards[0], bool(terminated[0])) == ([2002, 2001], 0.0, False)
     begun = seen["agent_pos"][0].copy()
-    # However many have begun by themselves, the next round is the next round.
+    # The next round follows, regardless of the number of automatic starts.
     _, infos = envs.reset()
     assert infos["seed"].tolist() == [2002, 2003]
     seen, _ = envs.reset(seed=[2002, 7])
@@ -182,7 +182,7 @@ def test_a_fork_leaves_its_parents_files_alone(tmp_path: Path) -> None:
     with tandem.Episode("handover", 2000, record=tmp_path / "alone") as episode:
         child = os.fork()
         if child == 0:
-            # Whatever a child does, and however it ends.
+            # The number of refusals is the exit code of the child.
             refused = 0
             for asked in (lambda: envs.step(standing(2)), lambda: episode.wait(1)):
                 try:

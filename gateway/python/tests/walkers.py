@@ -13,7 +13,7 @@ import tandem
 
 
 def walk(episode: tandem.Episode) -> None:
-    """Walks a little, further at odd seeds, which it has to be told."""
+    """Walks a little, and further at odd seeds, which it receives."""
     assert episode.seed is not None
     for _ in range(1 + episode.seed % 2):
         episode.walk(10, [tandem.WalkMove("A", 0.2, 0.0, 0.0)])
@@ -21,7 +21,7 @@ def walk(episode: tandem.Episode) -> None:
 
 @dataclass
 class NotingWalker:
-    """Walks as `walk` does, and notes where; on the doomed node its first episode goes on until the node is gone.
+    """Walks like `walk`, and writes down its node. On the node that is to fail, its first episode lasts until the node is gone.
 
     The others wait for that one to begin: a node may take longer to start a process than they take for all episodes.
     """
@@ -45,7 +45,7 @@ class NotingWalker:
 
 
 def fail(episode: tandem.Episode) -> None:
-    """Waits; at two seeds it takes its process down, or raises an exception."""
+    """Waits. At two seeds it ends its process, or raises an exception."""
     if episode.seed == 2021:
         os._exit(1)
     if episode.seed == 2022:

@@ -63,7 +63,8 @@ pub fn run(args: DemoArgs) -> CommandResult {
     Ok(if recorded && (!known || passed(&results)) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints the results.
+/// Plays the seeds one after another on a server with these flags, recorded under `runs`, and prints the
+/// results.
 pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultReply>, Box<dyn Error>> {
     let flags = Layer {
         listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),

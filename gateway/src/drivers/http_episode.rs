@@ -69,7 +69,7 @@ impl HttpEpisode {
             .http_status_as_error(false)
             // The server is nearby, so no proxy is used.
             .proxy(None)
-            // With a limit on the whole call, ureq would resolve every address on a thread of its own.
+            // With a limit on the whole call, ureq would resolve every address on a separate thread.
             .timeout_recv_response(Some(TIMEOUT))
             .timeout_recv_body(Some(TIMEOUT))
             .build()

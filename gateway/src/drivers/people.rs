@@ -54,7 +54,7 @@ pub struct People {
 }
 
 impl People {
-    /// Starts a server with one seat for each of `robots`, for the `planned` episodes. Bad ones are moved
+    /// Starts a server with an operator for each of `robots`, for the `planned` episodes. Bad ones are moved
     /// to `aside`.
     pub fn start(
         settings: Settings,

@@ -7,7 +7,7 @@ use std::{env, io, process::Command};
 
 /// Environment variable that names the interpreter with the package. The command of a wheel sets its own.
 const PYTHON_VARIABLE: &str = "TANDEM_PYTHON";
-/// On Windows `python3` is an alias that opens a store.
+/// On Windows `python3` is an alias that opens the Microsoft Store.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
 /// Flag that makes the module only check its requirements.
@@ -140,7 +140,7 @@ impl PythonModule {
         }))
     }
 
-    /// Returns the command for it, with `further` arguments before its own.
+    /// Returns the command of the interpreter, with `further` arguments before the command's own.
     pub fn command(&self, further: &[&str]) -> Command {
         let mut command = Command::new(&self.python);
         command.args(["-m", self.part.module()]).args(further).args(&self.arguments);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tandem_episodes::{DEFAULT_ROBOT, embedded_robot};
 
-/// Writes the embedded robot with one absurd joint. The joint does nothing while the robot stands still;
+/// Writes the embedded robot with one absurd joint. The joint has no effect while the robot stands still;
 /// moving it takes a torque beyond single precision.
 pub fn write_absurd_robot(path: &Path) {
     let sound = embedded_robot(DEFAULT_ROBOT).unwrap();

@@ -65,8 +65,8 @@ impl Answer {
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 status.fallen.retain(|entry| entry.robot == robot)
             }
-            // A look is of the own robot alone, the commands of a plan are already answered so, and a
-            // result concerns all robots.
+            // An observation shows the operator's robot alone, replies to a plan's commands are already
+            // restricted, and a result concerns all robots.
             ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
         }
         self
@@ -111,8 +111,8 @@ impl Answer {
         Answer { heard, ..self }
     }
 
-    /// Reports partners that only fell silent in the last part of a command by what they did in the parts
-    /// before: two that wait for each other then both learn of it, whichever ends first.
+    /// Reports the earlier behaviour of partners that fell silent only in the last part of a command. Two
+    /// operators that wait for each other then both learn of it, whichever ends first.
     pub fn with_partners_before(mut self, before: Vec<Partner>) -> Answer {
         for earlier in before.into_iter().filter(|earlier| earlier.did == PartnerDid::Acted) {
             let silent = self

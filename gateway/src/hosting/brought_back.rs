@@ -1,7 +1,7 @@
 //! Episodes of a server that has ended, or of other servers on the same runs folder.
 //!
-//! They are found by their journals and sleep until a request needs them. Episodes that stay idle for
-//! long are put to sleep here as well.
+//! They are found by their journals and sleep until a request needs them. Episodes that stay idle for long
+//! are suspended here as well.
 
 use std::{
     fs,
@@ -25,8 +25,8 @@ use super::{
 /// megabytes.
 const MAX_AWAKE: usize = 96;
 
-/// An episode may be put to sleep after one idle second for each of these control steps. That is ten
-/// times as long as bringing it back takes.
+/// An episode may be suspended after one idle second for each of these control steps. That is ten times as
+/// long as bringing it back takes.
 const STEPS_PER_IDLE_S: u32 = 300;
 
 impl EpisodeTable {
@@ -149,8 +149,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Ends abandoned episodes and puts idle ones to sleep. Also reconnects the partners that drove on
-    /// the server before this one. Call it periodically from within the async runtime.
+    /// Ends abandoned episodes and suspends idle ones. Also reconnects the partners that drove on the
+    /// previous server. Call it periodically from within the async runtime.
     pub fn tidy_up(&self) {
         let episodes = self.all();
         for episode in &episodes {
@@ -173,8 +173,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Forgets the sleeping episodes that other servers have taken over or ended. Call it every few
-    /// seconds.
+    /// Forgets the suspended episodes that other servers have taken over or ended. Call it every few seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {

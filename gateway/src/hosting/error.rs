@@ -145,7 +145,7 @@ pub enum HostingError {
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
-    /// One policy controls all robots, so no other driver can take one of them.
+    /// One policy controls all robots, so no other driver can take a robot.
     #[error(
         "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for \
          somebody else to drive one of them"

@@ -71,7 +71,7 @@ type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 type SharedNote = Result<(), Arc<HostingError>>;
 
 impl Beside {
-    /// Creates the state for an episode that `team` drives, or one policy if there is none.
+    /// Creates the state for an episode driven by `team`, or by one policy if there is no team.
     pub fn new(team: Option<Team>) -> Beside {
         Beside { team: team.map(Arc::new), ..Beside::default() }
     }
@@ -245,7 +245,7 @@ impl HostedEpisode {
         self.team().is_some_and(|team| team.may_talk())
     }
 
-    /// Refuses a tool that is not available to `who`, whatever its arguments are.
+    /// Refuses a tool that is not available to `who`, with any arguments.
     pub fn check_offered(&self, who: &Caller, tool: &str) -> Result<(), HostingError> {
         let is_operator = matches!(who, Caller::Operator { .. });
         let for_talk = |tool: &str| TalkCall::TOOLS.contains(&tool);
@@ -295,7 +295,7 @@ impl HostedEpisode {
         }
     }
 
-    /// Answers a call, with links in place of images where it asks for them.
+    /// Answers a call. Links replace the images if the call asks for links.
     async fn answer(
         self,
         robot: Option<String>,

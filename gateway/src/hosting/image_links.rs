@@ -17,7 +17,7 @@ pub struct ImageLinks(Mutex<VecDeque<LinkedImage>>);
 /// A linked image.
 #[derive(Debug, Clone)]
 pub struct LinkedImage {
-    /// The robot whose camera took it.
+    /// The robot whose camera took the image.
     pub robot: String,
     /// The PNG file.
     pub png: Arc<[u8]>,
@@ -31,7 +31,7 @@ impl ImageLinks {
         for CameraImage { robot, png_base64 } in std::mem::take(&mut seen.images) {
             let name = format!("{step}-{robot}.png");
             let path = format!("/v1/episodes/{episode}/images/{name}");
-            // Another look at the same step shows the same.
+            // A second observation of the same step gives the same image.
             kept.retain(|image| image.name != name);
             kept.push_back(LinkedImage { robot: robot.clone(), png: png_base64.0.into(), name });
             seen.links.push(ImageLink { robot, path });
@@ -86,7 +86,7 @@ mod tests {
         assert!(first.images.is_empty());
         let found = links.find("300-B.png").unwrap();
         assert_eq!((found.robot.as_str(), &*found.png), ("B", &b"B"[..]));
-        // Looking again at the same step drops nothing.
+        // A second observation of the same step drops no image.
         (0..MAX_LINKED_IMAGES).for_each(|_| links.link("x", 300, &mut seen(&["A"])));
         assert!(links.find("300-B.png").is_some());
         (1..MAX_LINKED_IMAGES as u32).for_each(|step| links.link("x", 300 + step, &mut seen(&["A"])));

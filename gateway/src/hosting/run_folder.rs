@@ -30,7 +30,7 @@ pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
     })
 }
 
-/// Does the same as [`try_runs_folder`], but leaves nothing behind.
+/// Checks like [`try_runs_folder`], but removes the folders that it has created.
 pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     let named = runs.ancestors().filter(|path| !path.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|path| !path.exists()).collect();
@@ -40,8 +40,7 @@ pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     tried
 }
 
-/// Returns the public name of an episode: its task and its seed, or a random text in place of a hidden
-/// seed.
+/// Returns the public name of an episode: its task and its seed. A random text replaces a hidden seed.
 pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
     let task = &spec.task.id;
     Ok(match spec.told_seed() {
@@ -56,8 +55,8 @@ const RANDOM_NAME_CHARS: usize = 10;
 /// Names and creates the folders of one server.
 #[derive(Debug, Default)]
 pub struct RunFolders {
-    /// Names of episodes that got a folder. The folder may be gone again, for example if nothing could be
-    /// written into it.
+    /// Names of episodes that got a folder. The folder may have been removed, for example if no file could be
+    /// written there.
     given: Mutex<BTreeSet<String>>,
     /// Number of episodes that got no folder.
     without: AtomicU32,

@@ -49,13 +49,14 @@ pub struct EpisodeTable {
 /// Purpose of a server, and the policy that can drive beside people.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Purpose of the server, which decides who starts episodes and drives their robots.
+    /// Purpose of the server, which determines the clients that start episodes and the drivers of their
+    /// robots.
     pub purpose: Purpose,
     /// Policy that drives a robot on request of a person; pages cannot name another one.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// The purpose of a server. It decides who starts episodes, and who may drive their robots.
+/// The purpose of a server. It determines the clients that start episodes and the drivers of their robots.
 #[derive(Debug, Clone, Default)]
 pub enum Purpose {
     /// Clients start episodes and choose the drivers.
@@ -116,7 +117,7 @@ impl EpisodeTable {
         matches!(self.purpose, Purpose::Evaluation)
     }
 
-    /// Returns true if clients start episodes here and may come back to them.
+    /// Returns true if clients start episodes here and may return to them.
     pub fn serves_clients(&self) -> bool {
         matches!(self.purpose, Purpose::Clients)
     }
@@ -265,8 +266,8 @@ impl EpisodeTable {
         Surroundings { folder, place, metrics: self.metrics.clone(), memory, journals }
     }
 
-    /// Returns the reply to `list_tasks`, with this server's limit on thinking time and without what is
-    /// hidden from its policies.
+    /// Returns the reply to `list_tasks`, with this server's limit on thinking time and without information
+    /// that is hidden from its policies.
     pub fn task_list(&self) -> TaskList {
         let Settings { tasks, stress, base_limits, instructions, .. } = &*self.settings;
         let mut list = instructions.task_list(tasks, *stress, base_limits);
@@ -275,7 +276,7 @@ impl EpisodeTable {
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
         }
         match self.settings.assistance {
-            // How the score is counted is not part of the task.
+            // The counting of the score is not part of the task.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
             Assistance::Full => {}
         }
@@ -335,7 +336,7 @@ impl EpisodeTable {
         EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
-    /// Lists the episodes that are put aside until somebody asks for them, by id. A picture would wake them.
+    /// Lists the suspended episodes, by id. Rendering an image would wake them.
     pub fn asleep(&self) -> Vec<String> {
         let held = self.lock();
         let asleep = held.episodes.values().filter(|episode| episode.thread.sleeps());
@@ -409,8 +410,8 @@ impl EpisodeTable {
     /// Takes no more episodes, ends those that are held after the calls already waiting, and closes every
     /// file.
     ///
-    /// Returns when all are closed or after `limit`, with the names of those that were not closed by
-    /// then. With `keep`, episodes go on when they are brought back; sleeping episodes always do.
+    /// Returns when all are closed or after `limit`, with the names of those that were not closed by then.
+    /// With `keep`, episodes go on when they are brought back; suspended episodes always do.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {

@@ -160,7 +160,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     late.close().await.unwrap();
 }
 
-/// Checks that a request to a sleeping episode differs from others only in its duration.
+/// Checks that a request to a suspended episode differs from others only in its duration.
 #[tokio::test]
 async fn an_episode_that_was_put_aside_is_as_it_was() {
     let runs = tempfile::tempdir().unwrap();

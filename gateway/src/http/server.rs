@@ -26,8 +26,8 @@ use crate::{
 /// their own.
 const HTTP_THREADS: usize = 2;
 
-/// Minimum number of connections of one address that may wait for a request, whatever the limit on
-/// requests is.
+/// Minimum number of connections of one address that may wait for a request, even if the limit on requests is
+/// lower.
 const MIN_WAITING_PER_ADDRESS: usize = 64;
 
 /// Time that requests may take to arrive at shutdown.

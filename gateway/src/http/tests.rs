@@ -1,4 +1,4 @@
-//! Test of an episode whose physics diverges, driven over HTTP beside a sound one.
+//! Test of an episode with diverging physics, over HTTP and at the same time as a normal one.
 
 use std::{path::Path, sync::Arc};
 

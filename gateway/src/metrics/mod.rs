@@ -70,8 +70,8 @@ impl Metrics {
         self.lock().physics
     }
 
-    /// Returns all counts in the format of Prometheus. `held` episodes are held at present, of which
-    /// `running` have not ended.
+    /// Returns all counts in the format of Prometheus. `held` is the number of episodes at present, and
+    /// `running` the number of those that have not ended.
     pub fn page(&self, held: usize, running: usize) -> String {
         let counts = self.lock();
         let mut page = MetricsPage::default();

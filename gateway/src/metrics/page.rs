@@ -88,7 +88,7 @@ impl Histogram {
         self.sum += took;
     }
 
-    /// Returns, for each bound, the number of durations up to it; the last is the number of all.
+    /// Returns the number of durations up to each bound. The last number counts all durations.
     fn cumulative(&self) -> [u64; BOUNDS_S.len() + 1] {
         let mut sum = 0;
         self.counts.map(|count| {

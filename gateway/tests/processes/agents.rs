@@ -18,7 +18,7 @@ fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
     (output, printed.concat())
 }
 
-/// Creates an interpreter that runs `what` in place of the loop, or `when_checked` if it is only checked.
+/// Creates an interpreter that runs `what` instead of the loop, or `when_checked` if it is only checked.
 #[cfg(unix)]
 fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;

@@ -1,5 +1,5 @@
-//! Tests of the program in a process of its own: stopped, killed, resumed, on a full disk, with its log
-//! and its information about itself.
+//! Tests of the program in a separate process: stopped, killed, resumed, on a full disk, with its log and its
+//! information about itself.
 
 mod agents;
 mod command_line;

@@ -11,7 +11,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-/// A collection in a process of its own, with its printed links.
+/// A collection in a separate process, with its printed links.
 struct Collecting {
     process: Child,
     base: String,

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::skipped::skipped;
 
-/// Runs `tandem` in `folder`, where it succeeds, and returns what it printed.
+/// Runs `tandem` in `folder`, checks that it succeeds, and returns its output.
 #[track_caller]
 fn tandem(folder: &Path, arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
@@ -105,7 +105,7 @@ fn models_are_one_table_with_links_to_what_they_said() {
     );
     play(place.path(), &program, "runs/program");
     play(place.path(), "idle", "runs/idle");
-    // The same episode as a server and `tandem agent` leave it.
+    // This is the same episode in the form in which a server and `tandem agent` leave it.
     let (played, served) =
         (place.path().join("runs/program/episodes/handover-2000"), "runs/served/handover-seed2000");
     let served = place.path().join(served);

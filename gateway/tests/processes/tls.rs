@@ -159,7 +159,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
             }
         }
     });
-    // A proxy that accepts connections and answers nothing; local servers must be reached without it.
+    // A proxy that accepts connections and never answers. Local servers must be reached without it.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let proxy = format!("http://{}", silent.local_addr().unwrap());
     let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));

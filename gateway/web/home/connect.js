@@ -38,7 +38,7 @@ export class Connect {
   }
 
   /**
-   * Takes over changes: task and seed, an episode that was started here, or that a token is needed.
+   * Applies changes: task and seed, an episode that was started here, or the need for a token.
    * @param {Partial<Given>} changed
    */
   show(changed) {

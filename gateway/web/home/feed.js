@@ -20,7 +20,7 @@ export class Feed {
   /**
    * @param {import("./running.js").Running} running
    * @param {import("./finished.js").Finished} finished
-   * @param {{ value: string }} token the server's, as its field has it
+   * @param {{ value: string }} token the server's token, from its field
    */
   constructor(running, finished, token) {
     this.running = running;
@@ -48,7 +48,7 @@ export class Feed {
       if (text === this.shown) return;
       this.shown = text;
       say(this.version, list.version ?? "");
-      // One that has ended is looked at as its folder has it, once that is written.
+      // An ended episode is shown from its folder, once that is written.
       const finishedRuns = new Set(list.finished.map(({ run }) => run));
       this.running.take(
         list.held.filter((entry) => !finishedRuns.has(entry.episode_id)),
@@ -82,7 +82,7 @@ export class Feed {
     return { held: episodes, asleep: [], evaluations: [], finished: [] };
   }
 
-  /** Asks for the watch link, in place of the finished episodes. */
+  /** Asks for the watch link, where the finished episodes would be. */
   makeDoor() {
     const field = element("input", { name: "link", autocomplete: "off", required: true });
     const told = element("p", { class: "bad", role: "alert" });

@@ -1,4 +1,4 @@
-// The choice among finished episodes: by task, policy, result, age and text. The page's address has it, so
+// The choice among finished episodes: by task, policy, result, age and text. The page's address contains it, so
 // that it can be shared.
 
 /**
@@ -9,7 +9,7 @@
  * }} FinishedEpisode
  */
 /**
- * A value for each of `NAMES`; an empty one lets everything through.
+ * A value for each of `NAMES`; an empty value matches every episode.
  * @typedef {Record<string, string>} Choice
  */
 
@@ -29,7 +29,7 @@ export const AGES = [
 export const NAMES = ["text", "task", "policy", "result", "age"];
 
 /**
- * Returns an episode's policy for a list, or what is shown in place of one.
+ * Returns an episode's policy for a list, or the text for an unknown policy.
  * @param {FinishedEpisode} episode
  */
 export const policyOf = ({ policy }) => policy ?? "not named";
@@ -54,7 +54,7 @@ export function chosenIn(query) {
 }
 
 /**
- * Returns the query of an address with a choice in it; other parameters stay.
+ * Returns the query of an address with a choice. Other parameters are kept.
  * @param {string} query
  * @param {Choice} choice
  */
@@ -69,7 +69,7 @@ export function withChoice(query, choice) {
 }
 
 /**
- * Returns the entries that a choice lets through. Every word of its text has to occur in what a card says.
+ * Returns the entries that match a choice. Every word of its text has to occur on the card.
  * @param {FinishedEpisode[]} entries
  * @param {Choice} choice
  * @param {number} nowS

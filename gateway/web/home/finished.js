@@ -4,7 +4,7 @@ import { element, say, words } from "../src/dom.js";
 import { AGES, NAMES, RESULTS, chosenIn, counted, filtered, policyOf, withChoice } from "./filters.js";
 import { finishedCard } from "./finished_card.js";
 
-/** Cards that are shown at first, and more at each press. */
+/** Number of cards that are shown at first, and added at each press. */
 const PAGE_CARDS = 12;
 
 /** @typedef {import("./filters.js").FinishedEpisode} FinishedEpisode */
@@ -20,7 +20,7 @@ export class Finished {
     this.choice = chosenIn(location.search);
     this.shown = PAGE_CARDS;
     /**
-     * The episodes that are to be compared, two at most.
+     * The episodes to compare, at most two.
      * @type {{ run: string, name: string, button: HTMLElement }[]}
      */
     this.beside = [];
@@ -97,7 +97,7 @@ export class Finished {
     return { filters, fields: Object.fromEntries(rows.map(([name, , field]) => [name, field])) };
   }
 
-  /** Takes over a new list. @param {FinishedEpisode[]} entries */
+  /** Shows a new list. @param {FinishedEpisode[]} entries */
   take(entries) {
     this.entries = entries;
     this.options("task", ({ result }) => result.task, words);
@@ -107,7 +107,7 @@ export class Finished {
   }
 
   /**
-   * Offers the values that occur. One that was chosen by the address stays, although nothing has it.
+   * Offers the values that occur. A value that the address selects stays, even without episodes.
    * @param {string} name
    * @param {(entry: FinishedEpisode) => string} valueOf
    * @param {(value: string) => string} told
@@ -167,7 +167,7 @@ export class Finished {
       );
     else if (!cards.length)
       cards.push(element("p", { class: "soft" }, "No episode fits. Clear the filters to see all of them."));
-    // Cards that stay keep their images, and the focus.
+    // Cards that remain keep their images, and the focus.
     const same =
       cards.length === this.grid.children.length &&
       cards.every((card, index) => card === this.grid.children[index]);
@@ -207,7 +207,7 @@ export class Finished {
     return button;
   }
 
-  /** Shows which episodes are to be compared, and the link once there are two. */
+  /** Shows the episodes to compare, and the link once there are two. */
   showPair() {
     for (const button of this.grid.querySelectorAll("[aria-pressed]"))
       button.setAttribute("aria-pressed", "false");

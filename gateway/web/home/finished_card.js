@@ -16,7 +16,7 @@ export function finishedCard(entry, button) {
   const { run, result, ended_unix_s: endedS, recorded, strip } = entry;
   const { all, reached } = phasesOf(entry);
   const done = all > 0 && reached === all;
-  // A failed episode opens where it failed, which is its end.
+  // A failed episode opens at its end, where it failed.
   const at = done ? "" : `&at=${(result.env_steps / CONTROL_HZ).toFixed(1)}`;
   const name = words(result.task);
   return element(
@@ -62,7 +62,7 @@ export function finishedCard(entry, button) {
   );
 }
 
-/** Makes the image of a strip, as wide that a cell of it fills its card. @param {string} src */
+/** Makes the image of a strip, in the width at which one cell fills the card. @param {string} src */
 function lastMoment(src) {
   const image = element("img", {
     src,

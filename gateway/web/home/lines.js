@@ -1,10 +1,10 @@
 // Lines to copy that connect an agent to this server.
 
-/** A name for the shell's variable that has the server's token. */
+/** Name of the shell variable for the server's token. */
 const TOKEN = "TANDEM_TOKEN";
 
 /**
- * Returns the ways to connect, each with its lines. `episode` is the id of one that this page has started;
+ * Returns the ways to connect, each with its lines. `episode` is the id of an episode that this page has started;
  * without it, the lines start one.
  * @param {{ url: string, locked: boolean, task: string, seed: number, episode?: string }} given
  */

@@ -63,7 +63,7 @@ export function home(main) {
   load().catch((error) => say(feed.problem, error.message));
 }
 
-/** Shows the list of episodes for those who have come by the watch link. @param {HTMLElement} main */
+/** Shows the list of episodes for visitors with the watch link. @param {HTMLElement} main */
 export function episodes(main) {
   document.title = "Tandem: episodes";
   const [running, finished] = [new Running(), new Finished()];

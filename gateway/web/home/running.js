@@ -46,7 +46,7 @@ export class Running {
   }
 
   /**
-   * Takes over a new list; `asleep` has the episodes that are put aside, and is null without the watch link.
+   * Shows a new list. `asleep` contains the suspended episodes; it is null without the watch link.
    * @param {HeldEpisode[]} held
    * @param {Evaluation[]} evaluations
    * @param {Set<string> | null} asleep
@@ -70,7 +70,7 @@ export class Running {
     this.evaluations.replaceChildren(...evaluations.map(evaluationCard));
   }
 
-  /** Draws one picture after another, so that a page with many episodes asks for no more than one at a time. */
+  /** Draws one picture after another, so that a page with many episodes requests only one at a time. */
   async draw() {
     for (const card of document.hidden ? [] : this.cards.values()) await card.draw();
     setTimeout(() => this.draw(), PICTURE_MS);
@@ -81,7 +81,7 @@ class HeldCard {
   /** @param {HeldEpisode} episode */
   constructor({ episode_id: id, task, seed, protocol, operators }) {
     this.source = `/watch/camera?episode=${encodeURIComponent(id)}&robot=third_person`;
-    /** The step of the newest picture, and that of the one that is shown. @type {number | null} */
+    /** Steps of the newest picture and of the shown one. @type {number | null} */
     this.wanted = null;
     /** @type {number | null} */
     this.drawn = null;
@@ -125,11 +125,11 @@ class HeldCard {
     say(this.state, ended ? words(ended) : sleeps ? "put aside" : "runs");
     this.state.className = `badge ${ended || sleeps ? "" : "live"}`;
     say(this.time, `${(step / CONTROL_HZ).toFixed(1)} s, step ${step}`);
-    // A picture would wake an episode that sleeps.
+    // A picture would wake a suspended episode.
     this.wanted = asleep && !sleeps ? step : null;
   }
 
-  /** Asks for the picture of the newest step, unless it is shown already. */
+  /** Requests the picture of the newest step, unless it is already shown. */
   async draw() {
     if (this.wanted === null || this.wanted === this.drawn) return;
     this.drawn = this.wanted;

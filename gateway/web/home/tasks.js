@@ -16,8 +16,8 @@ const CONTROL_HZ = 50;
 /** The section of tasks. */
 export class Tasks {
   /**
-   * @param {{ value: string }} token the server's, as its field has it
-   * @param {(started: { episode: string, task: string, seed: number }) => void} onStart hears of an episode
+   * @param {{ value: string }} token the server's token, from its field
+   * @param {(started: { episode: string, task: string, seed: number }) => void} onStart called with an episode
    *   that was started
    */
   constructor(token, onStart) {
@@ -59,7 +59,7 @@ export class Tasks {
   }
 
   /**
-   * Takes over the list of tasks, and asks for their pictures. The first one's is shown in `front`, too.
+   * Shows the list of tasks, and requests their pictures. The first task's picture is also shown in `front`.
    * @param {Task[]} tasks
    * @param {HTMLImageElement} front
    */
@@ -68,7 +68,7 @@ export class Tasks {
     if (tasks.length) this.draw(front, tasks[0].id);
     const cards = tasks.map((task) => this.card(task));
     this.grid.replaceChildren(...cards.map(({ node }) => node));
-    // A picture is rendered at its first request: those at the top come first.
+    // A picture is rendered at its first request, so those at the top are requested first.
     const seen = new IntersectionObserver(
       (changes) => {
         for (const { isIntersecting, target } of changes) {

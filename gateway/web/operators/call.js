@@ -1,6 +1,6 @@
-// Requests by operators, and by people who start episodes. Tokens go in a header: addresses are written to logs.
+// Requests by operators, and by people who start episodes. Tokens are sent in a header, because addresses are written to logs.
 
-/** A refusal, in the server's words. */
+/** A refusal, with the server's text. */
 export class Refused extends Error {
   /** @param {number} status @param {string} detail */
   constructor(status, detail) {
@@ -25,7 +25,7 @@ export const bearer = (token) => (token ? { authorization: `Bearer ${token}` } :
  * @param {string | null} token
  * @param {unknown} [body]
  * @param {RequestInit} [options]
- * @throws {Refused} in the server's words
+ * @throws {Refused} with the server's text
  */
 export async function call(path, token, body, options = { credentials: "omit" }) {
   const headers = bearer(token);

@@ -1,5 +1,5 @@
-// Episodes that the same people play one after another: each has one link for all of them. Between two episodes the page says what comes
-// next, and asks whether the last one was good.
+// Episodes that the same people play one after another: each person has one link for all episodes. Between two episodes the page
+// announces the next one, and asks whether the last one was good.
 
 import { element, reasonOf, words } from "../src/dom.js";
 import { Refused, call } from "./call.js";
@@ -20,7 +20,7 @@ const sleep = (/** @type {number} */ ms) => new Promise((done) => setTimeout(don
  */
 
 /**
- * Has the person of `seat` drive, mark and wait until all episodes are there.
+ * Lets the person of `seat` drive, mark and wait until all episodes are complete.
  * @param {HTMLElement} main
  * @param {Seat} seat
  */
@@ -46,7 +46,7 @@ export async function collect(main, seat) {
 }
 
 /**
- * Asks how far the collection is, and again while the server cannot be reached.
+ * Requests the progress of the collection, repeatedly while the server cannot be reached.
  * @param {HTMLElement} main
  * @param {Seat} seat
  * @returns {Promise<Progress>}
@@ -72,7 +72,7 @@ function show(main, { episode, planned, good, bad }, ...below) {
 }
 
 /**
- * Says what a person is to do, and waits until the person begins. Time begins when everybody has.
+ * Shows a person's instruction, and waits until the person begins. The clock starts when everybody has begun.
  * @param {HTMLElement} main
  * @param {Progress} progress
  * @param {string} episode
@@ -90,7 +90,7 @@ async function invited(main, progress, episode, { robot, token }) {
   });
 }
 
-/** Says what came of an episode, in a sentence. @param {import("./wheel.js").Ended} result */
+/** Returns the outcome of an episode in a sentence. @param {import("./wheel.js").Ended} result */
 function outcome({ ended, phases }) {
   const times = Object.values(phases ?? {});
   const counted = times.length ? `, with ${times.filter((time) => time !== null).length} of ${times.length} phases reached` : "";
@@ -115,7 +115,7 @@ const marked = (main, progress, seat, result) => new Promise((done) => {
 });
 
 /**
- * Shows the page of whoever runs the collection: a link for each person, and how far they are.
+ * Shows the page of the host of the collection: a link for each person, and the progress.
  * @param {HTMLElement} main
  * @param {Seat} seat
  */

@@ -1,5 +1,5 @@
-// One person drives one robot, in three dimensions. What the page says goes out 50 times a second; the server makes commands of it while
-// everybody is there, so that time stands still while a person's page is closed or out of view.
+// One person drives one robot, in three dimensions. The page sends its setpoints 50 times a second. The server makes commands from them
+// while everybody is present, so time is paused while a person's page is closed or out of view.
 
 import { Vector3 } from "three";
 import { reasonOf } from "../src/dom.js";
@@ -15,15 +15,15 @@ import { Wheel, tokensOf } from "./wheel.js";
 
 const SAY_MS = 20;
 const HEIGHT_RANGE_M = [0.5, 0.78];
-/** Time of a frame from which drawing is made simpler: a hand is seen to move two frames after it has. */
+/** Duration of a frame above which drawing is simplified: a hand's motion is visible two frames later. */
 const SLOW_FRAME_MS = 40;
-/** Control steps of a press of the step button. */
+/** Number of control steps for a press of the step button. */
 const STEPS = 10;
-/** A command that is under way takes no longer. */
+/** Maximum duration of a command that is being executed. */
 const FINISH_AGAIN_MS = 300;
-/** Share of the height that the robot's picture takes: below it are the robot's own hands, where they hang. */
+/** Share of the height that the robot's picture takes. The robot's hanging hands are below. */
 const PICTURE_SHARE = 0.7;
-/** Actions of the keys that act once; Enter acts only step by step. @type {Record<string, string>} */
+/** Actions of the keys that act once. Enter acts only in the stepwise mode. @type {Record<string, string>} */
 const KEYS = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "clutch", Enter: "step" };
 
 /** @typedef {import("../src/message.js").Side} Side */
@@ -37,8 +37,8 @@ const KEYS = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "c
  */
 
 /**
- * Shows the page of `seat` and drives until the episode has ended. Returns its result, and what gives back what the page draws with;
- * null where there is nothing to drive.
+ * Shows the page of `seat` and drives until the episode has ended. Returns its result, and a function that frees the page's drawing
+ * resources; null if there is no robot to drive.
  * @param {HTMLElement} main
  * @param {EpisodeSeat} seat
  */
@@ -63,19 +63,19 @@ class DrivePage {
   hand = "right";
   /** Finger joints to command. @type {Partial<Record<Side, number[]>>} */
   fingers = {};
-  /** Shares by which triggers have closed the hands. @type {Partial<Record<Side, number>>} */
+  /** Closure of the hands by triggers, as shares. @type {Partial<Record<Side, number>>} */
   shares = {};
   /** @type {number | null} */
   heightM = null;
   asksHeight = false;
-  /** Reason for which the person's own robot stands still. @type {string | null} */
+  /** Reason why the person's own robot stands still. @type {string | null} */
   paused = null;
-  /** Reason for which time stands still for others. @type {string | null} */
+  /** Reason why time is paused because of others. @type {string | null} */
   waits = null;
   stepwise = false;
   steps = 0;
   finishing = false;
-  /** Robots whose people have been away for very long. @type {Set<string>} */
+  /** Robots whose people have been absent for a long time. @type {Set<string>} */
   gone = new Set();
   over = new AbortController();
   left = false;
@@ -83,7 +83,7 @@ class DrivePage {
   pace = new Pace(SLOW_FRAME_MS);
   /** @type {Cockpit | null} */
   cockpit = null;
-  /** True if a step has come that is not shown yet. */
+  /** True if a received step is not shown yet. */
   stale = false;
   /** Time of the last report. @type {number | null} */
   timeS = null;
@@ -123,7 +123,7 @@ class DrivePage {
     }, this.over.signal);
   }
 
-  /** Drives until the episode is over. The last of it stays to be seen. */
+  /** Drives until the episode is over. The final state remains visible. */
   async drive() {
     this.wheel.connect();
     let said = performance.now();
@@ -148,7 +148,7 @@ class DrivePage {
   }
 
   /**
-   * Takes in the scene, for the first time or after the link was lost.
+   * Receives the scene, for the first time or after the connection was lost.
    * @param {import("../src/message.js").Scene} scene
    */
   begin(scene) {
@@ -159,7 +159,7 @@ class DrivePage {
     const stage = new Stage(this.panel.view, scene, (hash) =>
       fetch(`/operate/texture?hash=${hash}`, { headers: bearer(this.seat.token), credentials: "omit" }));
     stage.pictureShare = PICTURE_SHARE;
-    // What partners see is not what this person looks for.
+    // The partners' cameras are not useful to this person.
     stage.extras.frustums = false;
     stage.look(this.seat.robot);
     this.panel.border(true);
@@ -170,7 +170,7 @@ class DrivePage {
     scheme.addEventListener("change", () => stage.paint(), { signal: this.over.signal });
   }
 
-  /** Takes in a step. @param {import("../src/message.js").Frame} frame */
+  /** Receives a step. @param {import("../src/message.js").Frame} frame */
   see(frame) {
     if (!this.cockpit) return;
     const { hands } = this.cockpit;
@@ -180,7 +180,7 @@ class DrivePage {
     this.heightM ??= frame.row[frame.layout.robots[hands.robot].base + 3];
   }
 
-  /** Says what the robot is to do, after `passedS` more. @param {number} passedS */
+  /** Sends the setpoints of the robot, `passedS` after the last ones. @param {number} passedS */
   say(passedS) {
     if (!this.cockpit) return;
     const { hands, headset } = this.cockpit;
@@ -217,7 +217,7 @@ class DrivePage {
     this.steps = 0;
   }
 
-  /** Puts the scene to where the newest step has it. */
+  /** Moves the scene to the newest step. */
   show() {
     if (this.stale && this.cockpit) this.cockpit.stage.show(this.cockpit.frame, this.cockpit.frame, 1);
     this.stale = false;
@@ -236,7 +236,7 @@ class DrivePage {
   }
 
   /**
-   * Draws what is newest, and when the episode is over, its end, until the page is left.
+   * Draws the newest state, and after the episode its end, until the page is closed.
    * @param {number} now
    * @param {number} last
    */
@@ -251,7 +251,7 @@ class DrivePage {
     requestAnimationFrame((next) => this.draw(next, now));
   }
 
-  /** Takes in what the server says beside steps. @param {any} message */
+  /** Receives messages of the server other than steps. @param {any} message */
   told(message) {
     if (message.kind === "waits") {
       const { for: robots } = message;
@@ -267,7 +267,7 @@ class DrivePage {
     if (message.kind !== "refused" && message.kind !== "ended" && message.kind !== "replaced") this.standing();
   }
 
-  /** Takes in the report on a command. @param {import("./panel.js").Report} report */
+  /** Receives the report on a command. @param {import("./panel.js").Report} report */
   report(report) {
     for (const { from, text } of report.heard ?? []) this.panel.heard(from, text);
     for (const { robot, did } of report.partners ?? []) {
@@ -282,7 +282,7 @@ class DrivePage {
     this.panel.facts(report, report.robots.find(({ robot }) => robot === this.seat.robot));
   }
 
-  /** Says how things stand, until the episode is over. */
+  /** Shows the state of the episode until it is over. */
   standing() {
     if (this.wheel.over || !this.cockpit) return;
     const time = `${(this.timeS ?? this.cockpit.frame.time).toFixed(1)} s`;
@@ -308,7 +308,7 @@ class DrivePage {
     if (this.cockpit) this.standing();
   }
 
-  /** Leaves the task, with the robots that stand still beside this one, which nobody else would have finish. */
+  /** Leaves the task, also for the robots without a driver, for which nobody else would finish. */
   async finish() {
     this.finishing = true;
     this.say(0);
@@ -322,7 +322,7 @@ class DrivePage {
   }
 
   /**
-   * Finishes as the operator with a token; a command that is under way is answered first.
+   * Finishes as the operator with a token. A pending command is answered first.
    * @param {string} token
    */
   async finishAs(token) {
@@ -339,7 +339,7 @@ class DrivePage {
 
   /**
    * Lets a handle be dragged. Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. With Ctrl it turns the
-   * hand as a ball is turned that lies under the pointer, and the wheel turns it about the line of sight. Fingers choose by buttons.
+   * hand like a ball under the pointer, and the wheel turns it about the line of sight. On touch screens buttons select the effect.
    * @param {Side} side
    */
   draggable(side) {
@@ -350,7 +350,7 @@ class DrivePage {
       hands.shift(side, hands.inPelvis(stage.way(hands.handle(side), right, down, away)));
       this.panel.handle(side, stage.project(hands.handle(side)));
     };
-    // Not every browser says of a finger how far it has moved.
+    // Not every browser reports the displacement of a finger.
     let [x, y] = [0, 0];
     handle.addEventListener("pointerdown", (event) => {
       handle.setPointerCapture(event.pointerId);
@@ -380,7 +380,7 @@ class DrivePage {
 }
 
 /**
- * Puts handles and partners' cursors to where they are seen.
+ * Moves handles and partners' cursors to their places in the view.
  * @param {ReturnType<typeof layOut>} panel
  * @param {Cockpit} cockpit
  */

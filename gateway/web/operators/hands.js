@@ -1,13 +1,13 @@
-// Where a person wants the wrists of a robot to be: poses in its pelvis frame, which go where the pelvis goes. What is shown of them is
-// what the person said, at once, and not what the server has heard of it: on a slow link the hand follows its handle.
+// Wrist targets of a person for a robot: poses in its pelvis frame, which move with the pelvis. The page shows the person's input
+// immediately, and not the targets that the server has received: over a slow connection the hand follows its handle.
 
 import { Quaternion, Vector3 } from "three";
 import { POSE, SIDES, bySide } from "../src/message.js";
 
-/** A target is never further from its wrist: what is dragged against a table does not wind up. */
+/** Maximum distance of a target from its wrist, so that targets dragged into a table do not run away. */
 const LEASH_M = 0.2;
 const LEASH_RAD = 1;
-/** From a wrist to the middle of its palm, where a person takes hold of the hand. */
+/** Offset from a wrist to the middle of its palm, where its handle is. */
 const PALM_IN_WRIST_M = [0.1, 0, 0];
 
 /** @typedef {import("../src/message.js").Side} Side */
@@ -27,7 +27,7 @@ export class Hands {
     this.measured = bySide(() => ({ position: new Vector3(), turn: new Quaternion() }));
   }
 
-  /** Takes in a step. @param {import("../src/message.js").Frame} frame */
+  /** Receives a step. @param {import("../src/message.js").Frame} frame */
   see(frame) {
     const { row, layout } = frame;
     readPose(row, layout.links[this.robot], this.pelvis);
@@ -40,19 +40,19 @@ export class Hands {
     });
   }
 
-  /** Takes the targets away: the arms stay as they are. */
+  /** Removes the targets, so the arms keep their posture. */
   letGo() {
     this.targets = { left: null, right: null };
     this.turns = { left: null, right: null };
   }
 
-  /** Moves a target by a way in the pelvis frame. @param {Side} side @param {Vector3} by */
+  /** Moves a target by a displacement in the pelvis frame. @param {Side} side @param {Vector3} by */
   shift(side, by) {
     this.place(side, this.pose(side).position.add(by), this.turns[side]);
   }
 
   /**
-   * Turns a target about an axis of the pelvis frame, as far as the leash lets it.
+   * Turns a target about an axis of the pelvis frame, within its maximum angle from the wrist.
    * @param {Side} side
    * @param {Vector3} by Its direction is the axis, its length the angle.
    */
@@ -67,7 +67,7 @@ export class Hands {
   }
 
   /**
-   * Puts a target to a place in the pelvis frame, no further than its leash; and turns it, if `turn` is given.
+   * Moves a target to a place in the pelvis frame, within its maximum distance from the wrist. Also turns it if `turn` is given.
    * @param {Side} side
    * @param {Vector3} to
    * @param {Quaternion | null} [turn]
@@ -79,7 +79,7 @@ export class Hands {
   }
 
   /**
-   * Returns the target pose of a wrist, or its own pose where it has none, in the pelvis frame.
+   * Returns the target pose of a wrist, or its own pose without a target, in the pelvis frame.
    * @param {Side} side
    * @returns {Pose}
    */
@@ -88,13 +88,13 @@ export class Hands {
     return { position: (this.targets[side] ?? position).clone(), turn: (this.turns[side] ?? turn).clone() };
   }
 
-  /** Turns a way in the world into one in the pelvis frame. @param {Vector3} way */
+  /** Converts a displacement in the world to the pelvis frame. @param {Vector3} way */
   inPelvis(way) {
     return way.clone().applyQuaternion(this.pelvis.turn.clone().invert());
   }
 
   /**
-   * Returns the place of a handle in the world: in the palm of a hand that is where it is to be.
+   * Returns the place of a handle in the world: the palm of a hand at its target.
    * @param {Side} side
    */
   handle(side) {
@@ -103,7 +103,7 @@ export class Hands {
     return palm.applyQuaternion(this.pelvis.turn).add(this.pelvis.position);
   }
 
-  /** Returns the part of a `move_wrists` entry that is about wrists. @returns {Record<string, unknown>} */
+  /** Returns the wrists' part of a `move_wrists` entry. @returns {Record<string, unknown>} */
   wrists() {
     /** @type {Record<string, unknown>} */
     const move = { carried: true };

@@ -1,9 +1,9 @@
-// What a person wants of the robot, from keys, buttons and a gamepad.
+// A person's requests to the robot, from keys, buttons and a gamepad.
 
 /** @typedef {import("../src/message.js").Side} Side */
 /** @typedef {Partial<Record<Side, number>>} Triggers Shares by which the fingers of hands are closed. */
 /**
- * Wishes of a person: velocities of base, selected wrist and height, fingers by share or by joint, and whether the arms are to rest.
+ * Requests of a person: velocities of base, selected wrist and height, fingers by share or by joint, and true in `clutch` for resting arms.
  * @typedef {{
  *   vx_m_s: number, vy_m_s: number, yaw_rate_rad_s: number, wristM_s: number[], wristRad_s: number[], heightM_s: number,
  *   triggers: Triggers, fingers?: Partial<Record<Side, number[]>>, clutch: boolean,
@@ -26,8 +26,8 @@ const WRIST_KEYS = {
   ArrowUp: [1, 0, 0], ArrowDown: [-1, 0, 0], ArrowLeft: [0, 1, 0], ArrowRight: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
 /**
- * Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about
- * themselves.
+ * Axes of the pelvis frame about which a hand turns: fingers up and down, to the left and right, and about their
+ * own axis.
  */
 const ROTATION_KEYS = { i: [0, -1, 0], k: [0, 1, 0], j: [0, 0, 1], l: [0, 0, -1], u: [-1, 0, 0], m: [1, 0, 0] };
 /** @type {Record<string, number>} */
@@ -35,13 +35,13 @@ const HEIGHT_KEYS = { r: 1, f: -1 };
 
 const within = (/** @type {Event} */ event, /** @type {string} */ what) => event.target instanceof Element && Boolean(event.target.closest(what));
 /**
- * Tells whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which
- * they are pressed.
+ * Returns true if a key is for the element with the focus. Texts and lists take all keys, buttons and boxes those that
+ * press them.
  */
 const taken = (/** @type {KeyboardEvent} */ event) => within(event, "input:not([type=checkbox]), select, textarea") || ([" ", "Enter"].includes(event.key) && within(event, "button, input, a"));
 const nameOf = (/** @type {KeyboardEvent} */ event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
 /**
- * Sums the vectors of the keys that a table has.
+ * Sums the vectors of the held keys in a table.
  * @param {Set<string>} keys
  * @param {Record<string, number[]>} table
  */
@@ -49,8 +49,8 @@ const sum = (keys, table) =>
   [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), [0, 0, 0]);
 
 /**
- * Listens to keys until `signal` aborts; `pressed(key)` hears of those that act once, and tells whether it has used the key. Returns
- * the keys that are held.
+ * Listens to keys until `signal` aborts. `pressed(key)` is called for keys that act once, and returns true if it has used the key.
+ * Returns the held keys.
  * @param {(key: string) => boolean} pressed
  * @param {AbortSignal} signal
  */
@@ -85,7 +85,7 @@ function gamepad() {
 }
 
 /**
- * Reads what keys, gamepad and the pads for thumbs ask for now.
+ * Reads the present requests of keys, gamepad and the pads for thumbs.
  * @param {Set<string>} keys
  * @param {{ base: number[], height: number }} thumbs
  * @returns {Wanted}
@@ -107,7 +107,7 @@ export function wanted(keys, thumbs) {
 }
 
 /**
- * Adds what a headset's controllers ask for.
+ * Adds the requests of a headset's controllers.
  * @param {Wanted} want
  * @param {ReturnType<import("./headset/headset.js").Headset["wanted"]>} worn
  * @returns {Wanted}
@@ -126,7 +126,7 @@ export function withHeadset(want, { base, height, triggers, fingers }) {
 }
 
 /**
- * Returns joint angles of the fingers of `hand` that are closed by a share.
+ * Returns the joint angles of the fingers of `hand` at a share of closure.
  * @param {Side} hand
  * @param {number} share
  */

@@ -1,10 +1,10 @@
-// A link for a person at this screen, and as a QR code for one with a telephone or a headset.
+// A link for a person at this screen, and a QR code for a person with a telephone or a headset.
 
 import { copying, element } from "../src/dom.js";
 import { bearer } from "./call.js";
 
 /**
- * Makes a row of a list: the link, its QR code below, and further text. `token` is that of whoever shows it.
+ * Makes a row of a list: the link, its QR code below, and further text. `token` is that of the person who shows it.
  * @param {string} name
  * @param {string} href
  * @param {string} token
@@ -16,8 +16,7 @@ export async function linkRow(name, href, token, text = "") {
 }
 
 /**
- * Says whom the links of this page are for, where they name this machine by an address that each machine calls
- * itself by.
+ * Warns that the links of this page work only on this machine, if they contain an address such as localhost.
  */
 export function nearby() {
   const isOwn = /^(localhost|127\.|\[::1\])/.test(location.hostname);
@@ -26,7 +25,7 @@ export function nearby() {
 }
 
 /**
- * Makes the QR code of a text, which is sent as a body: addresses are written to logs.
+ * Makes the QR code of a text. The text is sent as a body, because addresses are written to logs.
  * @param {string} text
  * @param {string} token
  */

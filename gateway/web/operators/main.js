@@ -1,5 +1,5 @@
-// `/operate`: whoever comes by the link of a robot drives it, once or in all episodes of a collection; whoever comes without starts an
-// episode.
+// `/operate`: a visitor with the link of a robot drives it, once or in all episodes of a collection. A visitor without a link starts
+// an episode.
 
 import { collect, overview } from "./collect.js";
 import { drive } from "./drive.js";
@@ -8,14 +8,14 @@ import { start } from "./start.js";
 const KEPT = "tandem-operator";
 
 /**
- * Place of a person: a robot of an episode or of a collection, or a collection for whoever runs it; `still` has the robots that stand
- * still beside this one, with their tokens.
+ * Place of a person: a robot of an episode or of a collection, or a collection for its host. `still` contains the robots without
+ * a driver, with their tokens.
  * @typedef {{ token: string, robot: string, episode?: string, still?: string, collection?: string }} Seat
  */
 
 /**
- * Returns what the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a
- * page may be loaded again.
+ * Returns the contents of the link: from the fragment, which browsers do not send, or else from this tab, so that a
+ * page may be reloaded.
  * @returns {Seat | null}
  */
 function seat() {
@@ -28,9 +28,9 @@ function seat() {
   return JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
 }
 
-/** Shows what whoever comes is to see. @param {HTMLElement} main */
+/** Shows the page for this visitor. @param {HTMLElement} main */
 export function operate(main) {
-  // A second link pasted into the same tab changes the fragment alone.
+  // A second link pasted into the same tab changes only the fragment.
   addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
   const asked = new URLSearchParams(location.search);
   const run = asked.get("run");

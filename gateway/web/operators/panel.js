@@ -1,4 +1,4 @@
-// What the page of a person who drives is made of.
+// Parts of the page of a person who drives.
 
 import { element, reasonOf, say, words } from "../src/dom.js";
 import { SIDES, bySide } from "../src/message.js";
@@ -18,10 +18,10 @@ const TOUCH_WAYS = [
   ["Walk", "push the left pad; the right one turns, and lifts and lowers the body"],
 ];
 
-/** No handle is nearer to the border. */
+/** Minimum distance of a handle from the border. */
 const BORDER_PX = 32;
 
-/** Says that there is nothing to drive, and why. @param {HTMLElement} main @param {string} why */
+/** Shows the reason why there is no robot to drive. @param {HTMLElement} main @param {string} why */
 export function nothing(main, why) {
   main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, why),
     element("p", {}, "The link may be of another start of the server, or the episode has ended. ", element("a", { href: "/operate" }, "Start another")));
@@ -41,7 +41,7 @@ export function nothing(main, why) {
  * }} Report
  */
 /**
- * Acts of a person beside driving.
+ * Actions of a person other than driving.
  * @typedef {{
  *   act: (action: string) => void, speak: (text: string) => Promise<{ heard?: { from: string, text: string }[] }>, finish: () => void, look: (view: string) => void,
  *   wear: () => void, stepwise: (on: boolean) => void,
@@ -49,7 +49,7 @@ export function nothing(main, why) {
  */
 
 /**
- * Lays the page out; answers with what changes it. `pads` are for thumbs; `on` hears what the person does beside driving.
+ * Lays the page out, and returns functions that change it. `pads` are for thumbs; `on` receives the person's actions other than driving.
  * @param {HTMLElement} main
  * @param {import("./wheel.js").EpisodeSeat} seat
  * @param {Briefing} briefing
@@ -103,12 +103,12 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
     view, handles,
     heard: chat.heard,
     status: (/** @type {string} */ said) => say(status, said),
-    /** Returns how the episode stands, and what the hands do, as the page says it. */
+    /** Returns the page's text about the state of the episode and of the hands. */
     said: () => [status, facts].map((line) => line.textContent ?? ""),
-    /** Shows where the robot's picture ends, if the view is the robot's. @param {boolean} shown */
+    /** Shows the border of the robot's picture, if the view is the robot's. @param {boolean} shown */
     border: (shown) => { border.hidden = !shown; },
     /**
-     * Takes over the camera of the robot, and the share of the height that its picture takes.
+     * Sets the camera of the robot, and the share of the height that its picture takes.
      * @param {import("../src/message.js").CameraHead} camera
      * @param {number} share
      */
@@ -118,7 +118,7 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
     },
     headset: (/** @type {boolean} */ supported) => { wear.hidden = !supported; },
     handle: (/** @type {Side} */ side, /** @type {Seen} */ at) => put(handles[side], at, true, size),
-    /** Shows where a partner wants a wrist to be. @param {string} name @param {Side} side @param {Seen} at */
+    /** Shows a partner's wrist target. @param {string} name @param {Side} side @param {Seen} at */
     cursor: (name, side, at) => {
       const key = name + side;
       let cursor = cursors.get(key);
@@ -135,7 +135,7 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       phases.show(new Map((reply.phases ?? []).map(({ number, time_s: timeS }) => [number, timeS])));
     },
     /**
-     * Shows that the episode is over: what has come of it, and where it is found.
+     * Shows that the episode is over, with its outcome and its address.
      * @param {import("./wheel.js").Ended} result
      */
     ended: (result) => {
@@ -150,7 +150,7 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       if (!collection) after.replaceChildren(...whereFound(episode));
     },
     /**
-     * Shows which hand is chosen, and whether time passes by itself.
+     * Shows the chosen hand, and the mode of time: automatic or stepwise.
      * @param {{ hand: Side, paused: string | null, stepwise: boolean }} how
      */
     label: ({ hand, paused, stepwise: steps }) => {
@@ -161,7 +161,7 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
   };
 }
 
-/** The list of what is asked, phase by phase, where the server tells it. */
+/** The list of phases, if the server discloses them. */
 class Phases {
   /** @param {PhaseInfo[]} phases */
   constructor(phases) {
@@ -176,7 +176,7 @@ class Phases {
   }
 
   /**
-   * Shows those of `reached` that have a time as done; the others not yet, or, once it is `over`, never.
+   * Shows the phases of `reached` that have a time as done. The others are shown as open or, once it is `over`, as missed.
    * @param {Map<string, number | null>} reached
    * @param {boolean} [over]
    */
@@ -190,7 +190,7 @@ class Phases {
   }
 }
 
-/** Says where an episode that is over is found again. @param {string} episode */
+/** Shows the address of a finished episode. @param {string} episode */
 function whereFound(episode) {
   return [
     element("p", {}, "Its recording is ", element("code", {}, episode), " in the server's folder of runs. ",
@@ -200,8 +200,8 @@ function whereFound(episode) {
 }
 
 /**
- * Gives no focus to what is clicked, and takes it from a text that had it, so that keys drive; who comes by the
- * keyboard gives it.
+ * Keeps a clicked element from getting the focus, and removes the focus from a text, so that keys drive. The Tab key still
+ * moves the focus.
  * @param {MouseEvent} event
  */
 function keepKeys(event) {
@@ -211,8 +211,8 @@ function keepKeys(event) {
 }
 
 /**
- * Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. It is
- * moved by what needs no layout and no painting.
+ * Moves an element to its place in the view. A handle outside of the picture is put at its border; other elements are hidden. The
+ * motion uses a property that needs no layout and no painting.
  * @param {HTMLElement} thing
  * @param {Seen} at
  * @param {boolean} always
@@ -221,14 +221,14 @@ function keepKeys(event) {
 function put(thing, { x, y, ahead }, always, size) {
   const inside = ahead && Math.abs(x) <= 1 && Math.abs(y) <= 1;
   thing.hidden = !inside && !always;
-  // What lies behind is seen mirrored.
+  // Points behind the camera appear mirrored.
   const [u, v] = ahead ? [x, y] : [-x, -Math.abs(y) - 1];
   const within = (/** @type {number} */ share, /** @type {number} */ length) => Math.max(BORDER_PX, Math.min(length - BORDER_PX, share * length)).toFixed(1);
   thing.style.transform = `translate(${within((1 + u) / 2, size.width)}px, ${within((1 - v) / 2, size.height)}px) ${always ? "translate(-50%, -50%)" : "translate(-50%, .8rem)"}`;
 }
 
 /**
- * Makes the list of what people say to each other, and its form.
+ * Makes the list of people's messages, and its form.
  * @param {string} robot
  * @param {Acts["speak"]} speak
  */
@@ -249,7 +249,7 @@ function talk(robot, speak) {
   return { heard, elements: [chat, form], close: () => { form.hidden = true; } };
 }
 
-/** Says what the hands do, and what is left. @param {Report} reply @param {OwnReport | undefined} own */
+/** Returns the text about the hands and the remaining budget. @param {Report} reply @param {OwnReport | undefined} own */
 function factsOf(reply, own) {
   const hands = own ? SIDES.map((side) => {
     const { state: does, grip } = own[side];

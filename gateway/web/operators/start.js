@@ -1,4 +1,4 @@
-// The start of an episode whose robots people drive: what is played, and a link for each person.
+// The start of an episode whose robots people drive: the choice of the episode, and a link for each person.
 
 import { element, reasonOf, say, words } from "../src/dom.js";
 import { call, statusOf } from "./call.js";
@@ -6,7 +6,7 @@ import { linkRow, nearby } from "./links.js";
 
 const CONTROL_HZ = 50;
 
-/** The longest that an episode may wait for somebody who is away. */
+/** Maximum time that an episode may wait for an absent person. */
 const PATIENCE_S = 600;
 
 /** @typedef {import("../home/tasks.js").Task} Task */
@@ -23,7 +23,7 @@ const PATIENCE_S = 600;
  */
 
 /**
- * Makes a field with its name before it and what it means below.
+ * Makes a field with its name before and its meaning below.
  * @param {string} text
  * @param {HTMLElement} field
  * @param {HTMLElement | null} [help]
@@ -31,7 +31,7 @@ const PATIENCE_S = 600;
 const labelled = (text, field, help = null) => element("p", {}, element("label", {}, element("span", {}, text), field), help);
 
 /**
- * Lists who may drive a robot; `policy` is the learned one that the server was started with, if it was.
+ * Lists the possible drivers of a robot. `policy` is the learned policy of the server, if it has one.
  * @param {string | null} policy
  */
 const playersWith = (policy) => [
@@ -41,7 +41,7 @@ const playersWith = (policy) => [
 ];
 
 /**
- * Shows the form: of a new episode, of the task `wanted` if one was chosen, or of one that goes on at a moment of a finished one.
+ * Shows the form: of a new episode, of the task `wanted` if one was chosen, or of one that continues from a moment of a finished one.
  * @param {HTMLElement} main
  * @param {Moment | null} [from]
  * @param {string | null} [wanted]
@@ -129,7 +129,7 @@ export function start(main, from = null, wanted = null) {
   load();
 }
 
-/** Says what is left to a team by the rules of a protocol. @param {import("../home/tasks.js").Rules} rules */
+/** Returns the text about a protocol's limits for a team. @param {import("../home/tasks.js").Rules} rules */
 function toldRules({ protocol, episode_steps: steps, wall_clock_s: clockS }) {
   return `${protocol}: ${(steps / CONTROL_HZ).toFixed(0)} s${clockS ? ` within ${(clockS / 60).toFixed(0)} minutes` : ""}`;
 }
@@ -137,8 +137,8 @@ function toldRules({ protocol, episode_steps: steps, wall_clock_s: clockS }) {
 const robotCount = (/** @type {Task | undefined} */ task) => task?.robots?.length ?? 2;
 
 /**
- * Makes the links of an episode that has begun, and what programs need. Whoever drives the first robot also lets those stand still that nobody
- * drives.
+ * Makes the links of an episode that has begun, and the data for programs. The driver of the first robot also keeps robots without a
+ * driver standing still.
  * @param {Started} started the server's answer
  * @param {FormData} chosen
  * @param {string} hostToken

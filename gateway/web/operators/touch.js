@@ -1,14 +1,14 @@
-// What fingers on a screen do beside dragging handles: a pad walks, a pad turns the robot and lifts its body, and three buttons say what
-// dragging a handle does.
+// Controls for fingers on a screen, besides handles: a pad for walking, a pad that turns the robot and lifts its body, and three buttons
+// that select the effect of dragging a handle.
 
 import { element } from "../src/dom.js";
 
-/** Distance from its middle, in shares of its radius, up to which a pad asks for nothing. */
+/** Distance from its middle, in shares of its radius, below which a pad has no effect. */
 const DEAD_SHARE = 0.15;
 /** Effects of dragging a handle: along the picture, along the line of sight, or a turn. */
 const DRAGS = { across: "Across", along: "In, out", turn: "Turn" };
 
-/** Tells whether fingers, and no mouse, are what a person points with. */
+/** Returns true if a person points with fingers and not with a mouse. */
 export const byTouch = () => matchMedia("(pointer: coarse)").matches;
 
 /** The two pads and the buttons between them. */
@@ -30,8 +30,8 @@ export class Touch {
   }
 
   /**
-   * Returns what the pads ask for: shares ahead, to the left, round to the left, and up. A thumb that turns
-   * does not lift as well.
+   * Returns the requests of the pads: shares ahead, to the left, of a left turn, and up. A thumb that turns
+   * does not lift at the same time.
    */
   wanted() {
     const [right, down] = this.walk.at;
@@ -41,7 +41,7 @@ export class Touch {
   }
 }
 
-/** A round place on which a thumb says how far to the right and down, in shares of its radius. */
+/** A round pad that reports a thumb's offset to the right and down, in shares of its radius. */
 class Pad {
   at = [0, 0];
 
@@ -52,7 +52,7 @@ class Pad {
       class: `pad ${name}`, role: "group", "aria-label": label,
       onpointerdown: ({ pointerId, clientX, clientY }) => { this.node.setPointerCapture(pointerId); this.push(clientX, clientY); },
       onpointermove: ({ pointerId, clientX, clientY }) => { if (this.node.hasPointerCapture(pointerId)) this.push(clientX, clientY); },
-      // However it ends: lifted, or taken over by the system.
+      // The touch ends when the finger is lifted or the system takes over.
       onlostpointercapture: () => this.put([0, 0]),
       oncontextmenu: (event) => event.preventDefault(),
     }, ...Object.entries(signs).map(([place, sign]) => element("span", { class: place, "aria-hidden": "true" }, sign)), this.knob);

@@ -1,5 +1,5 @@
-// The socket by which a page drives: what the robot is to do goes out up to 50 times a second; the scene, every control step and what came
-// of the commands come back.
+// The socket by which a page drives. It sends setpoints up to 50 times a second, and receives the scene, every control step and the
+// outcomes of commands.
 
 import { Frame, readScene } from "../src/message.js";
 import { Refused, call, statusOf } from "./call.js";
@@ -8,7 +8,7 @@ const RETRY_MS = 1000;
 
 /** @typedef {import("./main.js").Seat & { episode: string }} EpisodeSeat Seat of an episode that is known. */
 /**
- * End of an episode, as its drivers hear it.
+ * End of an episode, in the form for its drivers.
  * @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended
  */
 
@@ -29,7 +29,7 @@ export class Wheel {
     this.heard = heard;
   }
 
-  /** Opens the socket, and opens it again when it is lost, until the episode is over. */
+  /** Opens the socket, and reopens it after a loss, until the episode is over. */
   async connect() {
     try {
       const robots = await enter(this.seat);
@@ -44,7 +44,7 @@ export class Wheel {
     }
   }
 
-  /** Takes in a message. @param {string | ArrayBuffer} data */
+  /** Receives a message. @param {string | ArrayBuffer} data */
   hear(data) {
     if (typeof data === "string") {
       const message = JSON.parse(data);
@@ -61,7 +61,7 @@ export class Wheel {
   }
 
   /**
-   * Says what the robot is to do from now on. What a slow link has not taken yet is better said later.
+   * Sends the present setpoints of the robot. While a slow connection has unsent data, they are sent later.
    * @param {unknown} word
    */
   say(word) {
@@ -88,7 +88,7 @@ export class Wheel {
   }
 }
 
-/** Asks how the episode has ended; null if it has not. @param {EpisodeSeat} seat */
+/** Requests the end of the episode; null if it has not ended. @param {EpisodeSeat} seat */
 async function hasEnded({ episode, token }) {
   try {
     const { ended } = await call(`/v1/episodes/${encodeURIComponent(episode)}/tools/get_status`, token, {});
@@ -110,7 +110,7 @@ function robotsOf({ robot, token, still }) {
 export const tokensOf = (seat) => robotsOf(seat).map(([, token]) => token);
 
 /**
- * Has the browser keep a cookie for each of these robots: a socket is asked for without headers. Returns their
+ * Stores a cookie for each of these robots, because a socket is requested without headers. Returns their
  * names.
  * @param {EpisodeSeat} seat
  */

@@ -7,7 +7,7 @@ import { Pace, Stage } from "./stage/stage.js";
 import { Targets } from "./targets.js";
 import { RecordedTime } from "./time.js";
 
-/** Time of a frame of both from which drawing is made simpler. */
+/** Duration of a frame of both above which drawing is simplified. */
 const SLOW_FRAME_MS = 80;
 
 /** @typedef {import("./message.js").WatchedScene} WatchedScene */
@@ -65,7 +65,7 @@ export async function besideEachOther(main, runs, at) {
   requestAnimationFrame(tick);
 }
 
-/** One of the two. */
+/** One of the two episodes. */
 class Side {
   /** @param {string} run @param {WatchedScene} scene @param {number} at */
   constructor(run, scene, at) {
@@ -105,7 +105,7 @@ class Side {
     );
   }
 
-  /** Begins to draw; the view has to be in the page. Returns what it draws with. */
+  /** Begins to draw. The view has to be in the page. Returns its stage. */
   begin() {
     const stage = new Stage(this.view, this.scene, watchedTexture);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.paint());
@@ -113,7 +113,7 @@ class Side {
   }
 
   /**
-   * Shows a moment of the clock; an episode that is over stays at its end. Returns whether it was drawn.
+   * Shows a moment of the clock. An episode that is over stays at its end. Returns true if it was drawn.
    * @param {Stage} stage
    * @param {number} moment
    * @param {boolean} moved
@@ -131,7 +131,7 @@ class Side {
   }
 }
 
-/** Lets the camera of each view follow that of the other. @param {Stage[]} stages */
+/** Makes the camera of each view follow the other one. @param {Stage[]} stages */
 function turnTogether(stages) {
   let following = false;
   stages.forEach(({ free, controls }, index) => {

@@ -1,4 +1,4 @@
-// Elements of a page. Texts are texts: nothing that comes from a policy becomes HTML.
+// Elements of a page. Texts are inserted as text, so text of a policy never becomes HTML.
 
 /** @typedef {string | number | boolean | null | undefined} Attribute */
 /** @typedef {Record<string, Attribute | ((event: any) => unknown)>} Properties */
@@ -21,16 +21,16 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
-/** Shows `text` where it is not shown yet. @param {Node} node @param {string} text */
+/** Sets the text of a node, unless it already has it. @param {Node} node @param {string} text */
 export function say(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** Returns a name with blanks in place of underscores. @param {string} name */
+/** Returns a name with blanks instead of underscores. @param {string} name */
 export const words = (name) => String(name).replaceAll("_", " ");
 
 /**
- * Says how an episode ended: by the end of a model's play, where that says more, else by its own.
+ * Describes the end of an episode: the ending of a model's play if that is more specific, or else the episode's own.
  * @param {import("./message.js").Result} result
  */
 export function endOf(result) {
@@ -41,7 +41,7 @@ export function endOf(result) {
 /** Returns the colour that the style sheet calls `name`. @param {string} name */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** Asks the server, and returns its answer; throws a refusal, in the server's words. @param {string} path */
+/** Sends a request to the server, and returns its answer. Throws a refusal with the server's text. @param {string} path */
 export async function ask(path) {
   const answer = await fetch(path);
   if (answer.ok) return answer;
@@ -49,17 +49,17 @@ export async function ask(path) {
   throw new Error(problem.detail ?? `the server answers ${answer.status}`);
 }
 
-/** Asks for an image on a surface of a scene that is watched. @param {string} hash */
+/** Requests an image on a surface of a watched scene. @param {string} hash */
 export const watchedTexture = (hash) => ask(`/watch/texture?hash=${hash}`);
 
-/** Says why something failed. @param {unknown} error */
+/** Describes the reason of a failure. @param {unknown} error */
 export const reasonOf = (error) => (error instanceof Error ? error.message : String(error));
 
 /** Makes a small label of a state; `kind` is its colour. @param {string} text @param {string} kind */
 export const badge = (text, kind) => element("span", { class: `badge ${kind}` }, text);
 
 /**
- * Makes a button that copies a text. Browsers let pages copy that came over HTTPS or from their own machine; others get no button.
+ * Makes a button that copies a text. Browsers let pages copy only if they came over HTTPS or from the same machine. Other pages get no button.
  * @param {() => string} text
  */
 export function copying(text, label = "Copy") {
@@ -71,5 +71,5 @@ export function copying(text, label = "Copy") {
   return copy;
 }
 
-/** Returns the colour of a robot, which is that of its accent. @param {number} robot */
+/** Returns the colour of a robot's accent. @param {number} robot */
 export const robotColour = (robot) => colour(["--a", "--b", "--c"][robot % 3]);

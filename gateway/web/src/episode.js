@@ -13,7 +13,7 @@ import { Timeline } from "./timeline.js";
 const PLOTS_EVERY_MS = 250;
 const CAMERAS_EVERY_MS = 1000;
 const RECONNECT_MS = 2000;
-/** Time of a frame from which drawing is made simpler. */
+/** Duration of a frame above which drawing is simplified. */
 const SLOW_FRAME_MS = 60;
 
 /**
@@ -21,7 +21,7 @@ const SLOW_FRAME_MS = 60;
  */
 
 /**
- * Shows an episode that runs, or a finished one from a moment.
+ * Shows a running episode, or a finished one from a moment.
  * @param {HTMLElement} main
  * @param {Wanted} wanted
  */
@@ -41,14 +41,14 @@ class EpisodePage {
   problem = element("p", { class: "bad", role: "alert" });
   cameras = element("div", { class: "pictures" });
   look = element("input", { type: "checkbox", id: "look", onchange: () => this.drawCameras() });
-  /** Key of the pictures that were asked for last. */
+  /** Key of the pictures that were requested last. */
   pictured = "";
   /** True while a request for pictures is under way. */
   drawing = false;
-  /** True once the server holds the episode no more. */
+  /** True once the server no longer holds the episode. */
   closed = false;
   drawn = false;
-  /** True if the same moment has to be shown anew. */
+  /** True if the same moment has to be drawn again. */
   again = false;
   plotsDue = true;
   /** @type {{ number: string, lacks: string[] } | undefined} */
@@ -62,7 +62,7 @@ class EpisodePage {
    */
   constructor(main, wanted, query, scene) {
     const { head, frames } = scene;
-    /** Id of an episode that runs, or folder of a finished one. */
+    /** Id of a running episode, or folder of a finished one. */
     this.id = wanted.run ?? wanted.episode;
     this.query = query;
     this.scene = scene;
@@ -132,7 +132,7 @@ class EpisodePage {
       this.recorded ? this.files() : element("section", {}, element("h2", {}, "Calls and notes, the latest first"), this.story.node));
   }
 
-  /** Makes the choice of who looks, and of what is shown beside the scene. */
+  /** Makes the choice of the camera, and of the panel beside the scene. */
   tools() {
     const views = [["free", "Free camera"], ...this.head.robots.map(({ name }) => [name, `As robot ${name}`])];
     const choose = element("select", { "aria-label": "Camera", onchange: (event) => {
@@ -158,7 +158,7 @@ class EpisodePage {
       element("span", {}, "in a robot's colour: the force that it feels"));
   }
 
-  /** Makes the controls of a finished episode's time; null while one runs. */
+  /** Makes the controls of a finished episode's time; null for a running episode. */
   scrubber() {
     if (!this.player || !this.timeline) return null;
     this.player.node.append(this.taking());
@@ -166,7 +166,7 @@ class EpisodePage {
   }
 
   /**
-   * Makes the button that goes on from the moment that is shown, as an episode of its own whose robots people
+   * Makes the button that continues from the shown moment, as a new episode whose robots people
    * drive.
    */
   taking() {
@@ -203,7 +203,7 @@ class EpisodePage {
     socket.addEventListener("open", () => say(this.problem, ""));
     socket.addEventListener("close", async () => {
       if (this.result) {
-        // It was closed, and its folder may have a recording by now.
+        // The episode was closed, and its folder may contain a recording by now.
         this.closed = true;
         this.showEnd();
         return;
@@ -221,7 +221,7 @@ class EpisodePage {
     });
   }
 
-  /** Takes in an event. @param {any} event */
+  /** Receives an event. @param {any} event */
   told(event) {
     if (event.kind === "call" || event.kind === "note") this.story.add(event);
     if (event.kind === "phase") {
@@ -238,7 +238,7 @@ class EpisodePage {
     }
   }
 
-  /** Takes in a step or a picture. @param {ArrayBuffer} data */
+  /** Receives a step or a picture. @param {ArrayBuffer} data */
   shown(data) {
     const row = new Float32Array(data.slice(0, data.byteLength - (data.byteLength % 4)));
     if (row[0] === 2) {
@@ -253,7 +253,7 @@ class EpisodePage {
   }
 
   /**
-   * Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew.
+   * Shows the state after `seconds` more. Returns true if the scene was drawn again.
    * @param {number} seconds
    */
   draw(seconds) {
@@ -284,8 +284,8 @@ class EpisodePage {
   }
 
   /**
-   * Returns the pictures that are wanted: of a finished episode those that the policy was shown last, unless
-   * its reader wants all of this moment.
+   * Returns the pictures to show: of a finished episode those that the policy was shown last, unless
+   * the reader has chosen all pictures of this moment.
    */
   wantedPictures() {
     const { time } = this.time;
@@ -298,7 +298,7 @@ class EpisodePage {
     });
   }
 
-  /** Shows true pictures, drawn by the server as the robots see them. */
+  /** Shows the robots' camera images, which the server draws. */
   async drawCameras() {
     const wanted = this.wantedPictures();
     const key = JSON.stringify(wanted);
@@ -346,7 +346,7 @@ class EpisodePage {
     this.facts.replaceChildren(...facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
   }
 
-  /** Says what has been used up to the moment that is shown. */
+  /** Shows the budget used up to the shown moment. */
   soFar() {
     const told = this.head.story.filter((entry) => entry.time_s <= this.time.time + 1e-6);
     const calls = told.filter(({ kind, number }) => kind === "call" && number !== null).length;
@@ -374,5 +374,5 @@ class EpisodePage {
   }
 }
 
-/** Lists what the next phase lacks, as the simulator measures it. @param {string[]} lacks */
+/** Lists the missing conditions of the next phase, measured by the simulator. @param {string[]} lacks */
 const lacking = (lacks) => element("ul", { class: "lacks soft" }, ...lacks.map((lack) => element("li", {}, lack)));

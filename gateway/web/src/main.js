@@ -1,4 +1,4 @@
-// `/`: the start page. `/watch`: the episodes as cards, each on a page of its own, and two side by side. `/operate`: people drive robots.
+// `/`: the start page. `/watch`: the episodes as cards, each on its own page, and two side by side. `/operate`: people drive robots.
 
 import { episodes, home } from "../home/main.js";
 import { besideEachOther } from "./beside.js";

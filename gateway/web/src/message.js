@@ -1,4 +1,4 @@
-// What the server sends: scenes with their shapes, and steps as rows of numbers. `episodes/src/live/frame.rs` says what is in a row.
+// Messages of the server: scenes with their shapes, and steps as rows of numbers. `episodes/src/live/frame.rs` describes a row.
 
 /** @typedef {"left" | "right"} Side */
 /** @typedef {{ number: string, id: string, collaborative: boolean }} Phase */
@@ -13,7 +13,7 @@
 /**
  * @typedef {{ kind: "room" } | { kind: "link", robot: number, link: number } | { kind: "object", object: number }} Carrier
  */
-/** Emission and highlights of a surface; one that states nothing has none of this. */
+/** Emission and highlights of a surface. A surface without gloss in its file has no such fields. */
 /**
  * @typedef {{ emission: number, specular: number, shininess: number, roughness: number | null, metallic: number }} Gloss
  */
@@ -23,7 +23,7 @@
  *   | { kind: "along", scale_1_m: [number, number], centre_m: [number, number] }
  *   | { kind: "cube", scale_1_m: number[], centre_m: number[] }} Mapping
  */
-/** Image on a surface, with those of its gloss, its relief and its emitted light at the same places; by their numbers among `textures`. */
+/** Image on a surface, with the images of its gloss, its relief and its emitted light at the same places, as indices of `textures`. */
 /** @typedef {{ texture: number, gloss: number | null, relief: number | null, emitted: number | null, mapping: Mapping }} SurfaceImage */
 /**
  * @typedef {{
@@ -38,10 +38,10 @@
  */
 /** @typedef {[number, number, number]} Rgb */
 /** @typedef {{ positions: Float32Array, indices: Uint32Array, normals: Int8Array, uvs: Float32Array | null }} Mesh */
-/** Image that a page asks for by its hash, or the six of a cube. */
+/** Image that a page requests by its hash, or the six images of a cube. */
 /** @typedef {{ hash: string, images: number, mean_rgb: Rgb, has_alpha: boolean }} TextureHead */
 /**
- * Light of a scene's file. Its colours multiply those of the file as they are, and not as linear light.
+ * Light of a scene's file. Its colours multiply the file's values directly, without a conversion to linear light.
  * @typedef {{
  *   kind: "directional" | "spot" | "point", carrier: Carrier, position_m: number[], direction: number[],
  *   ambient: Rgb, diffuse: Rgb, specular: Rgb, attenuation: [number, number, number],
@@ -51,7 +51,7 @@
 /** @typedef {{ headlight: { ambient: Rgb, diffuse: Rgb, specular: Rgb }, lamps: Lamp[] }} Lights */
 
 /**
- * Header of a scene, which `episodes/src/live/scene.rs` writes. `robot` is the one that the page drives, if it drives.
+ * Header of a scene, which `episodes/src/live/scene.rs` writes. `robot` is the robot that the page drives, if there is one.
  * @typedef {{
  *   task: string, seed: number, protocol: string, instruction: string, assistance: string,
  *   episode_steps: number, thinking_s: number | null, phases: Phase[], robots: RobotHead[], objects: string[],
@@ -88,7 +88,7 @@
  * }} NoteEntry
  */
 /** @typedef {CallEntry | NoteEntry} Entry */
-/** Header of a scene for those who watch. */
+/** Header of a scene for watchers. */
 /** @typedef {SceneHead & { story: Entry[], reached: PhaseReached[], result: Result | null }} WatchedHead */
 /** @typedef {{ head: SceneHead, meshes: Mesh[], layout: Layout, frames: Frame[] }} Scene */
 /** @typedef {Scene & { head: WatchedHead }} WatchedScene */
@@ -137,7 +137,7 @@ export function layoutOf(head) {
   return { links, objects, robots, length: at };
 }
 
-/** A step as its row says it. */
+/** A step, read from its row. */
 export class Frame {
   /** @param {Float32Array} row @param {Layout} layout */
   constructor(row, layout) {
@@ -150,7 +150,7 @@ export class Frame {
   get stepsLeft() { return this.row[3]; }
   get clockLeft() { return this.row[4]; }
 
-  /** Tells whether a robot has fallen. @param {number} robot */
+  /** Returns true if a robot has fallen. @param {number} robot */
   fallen(robot) { return this.row[this.layout.robots[robot].fallen] > 0; }
 
   /**

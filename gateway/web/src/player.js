@@ -1,11 +1,11 @@
-// The controls of a recorded time: play, speed, keys, and a link to the moment that is shown.
+// The controls of a recorded time: play, speed, keys, and a link to the shown moment.
 
 import { copying, element, say } from "./dom.js";
 
 const SPEEDS = [0.25, 1, 4, 10];
 /** Step of the arrow keys. */
 const STEP_S = 0.1;
-/** Time without a change after which the address gets the moment; browsers refuse frequent changes. */
+/** Time without a change after which the moment is written to the address. Browsers refuse frequent changes. */
 const SETTLED_MS = 400;
 
 /** The controls of a recorded time. */
@@ -61,14 +61,14 @@ export class Player {
     this.time.play(!this.time.playing);
   }
 
-  /** Returns the page's address with the moment that is shown. */
+  /** Returns the page's address with the shown moment. */
   address() {
     const url = new URL(location.href);
     url.searchParams.set("at", this.time.time.toFixed(2));
     return url.href;
   }
 
-  /** Shows the moment; once it has settled, the page's address has it. */
+  /** Shows the moment. Once it has settled, it is written to the page's address. */
   show() {
     say(this.moment, `${this.time.time.toFixed(2)} of ${this.time.end.toFixed(1)} s`);
     say(this.play, this.time.playing ? "Pause" : "Play");

@@ -8,7 +8,7 @@ const HEIGHT = 84;
 
 /** @typedef {import("./message.js").Frame} Frame */
 /** @typedef {import("./targets.js").Targets} Targets */
-/** @typedef {[number, number]} Point A moment and a value. */
+/** @typedef {[number, number]} Point A time and a value. */
 /** @typedef {{ arms: number[][], legs: number[][] }} Joints Numbers of a robot's joints, by side. */
 /**
  * A plot of steps: a name, a unit, and a number of each robot's left and right.
@@ -65,7 +65,7 @@ export class Plots {
     }
   }
 
-  /** Forgets what a live plot shows no more. */
+  /** Removes the data that a live plot no longer shows. */
   trim() {
     const end = this.times[this.times.length - 1];
     const from = this.times.findIndex((time) => time >= end - LIVE_SPAN_S);
@@ -75,7 +75,7 @@ export class Plots {
   }
 
   /**
-   * Draws up to the present; with `cursor`, the whole episode and where it is looked at.
+   * Draws up to the present. With `cursor`, draws the whole episode and the shown moment.
    * @param {number | null} cursor
    * @param {number[]} marks
    */
@@ -105,7 +105,7 @@ export class Plots {
 }
 
 /**
- * Plots of what a finished episode has taken up to each moment: each a number that grows or shrinks with calls and notes.
+ * Plots of the budget that a finished episode has used up to each moment. Each number changes with calls and notes.
  */
 export class BudgetPlots {
   /** @param {import("./message.js").WatchedHead} head @param {Frame[]} frames */
@@ -137,11 +137,11 @@ export class BudgetPlots {
       element("figure", {}, element("figcaption", {}, element("b", {}, name), ` [${unit}] `, now), canvas)));
   }
 
-  /** Draws the whole episode and where it is looked at. @param {number} cursor @param {number[]} marks */
+  /** Draws the whole episode and the shown moment. @param {number} cursor @param {number[]} marks */
   draw(cursor, marks) {
     const [begin, end] = this.span;
     for (const { canvas, now, name, points, least, digits } of this.plots) {
-      // Between two moments nothing is taken, so each value holds until the next.
+      // Between two entries the values are constant.
       const held = points.flatMap(([time, value], index) => (index ? [[time, points[index - 1][1]], [time, value]] : [[time, value]]));
       if (held.length) held.push([end, held[held.length - 1][1]]);
       const line = { times: held.map(([time]) => time), values: held.map(([, value]) => value), first: 0, stroke: colour("--accent"), dash: [] };
@@ -176,7 +176,7 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   const scale = Math.min(devicePixelRatio, 2);
   canvas.width = width * scale;
   canvas.height = HEIGHT * scale;
-  // Drawn by the processor: a graphics processor in software, which draws the scene, takes many times as long for lines.
+  // Lines are drawn on a canvas by the processor. A software renderer for WebGL would take many times as long for them.
   const context = canvas.getContext("2d", { willReadFrequently: true });
   if (!context) return;
   context.scale(scale, scale);
@@ -197,7 +197,7 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
     context.setLineDash(dash);
     context.strokeStyle = stroke;
     context.lineWidth = 1.5;
-    // No more points than there are places for them.
+    // The number of points is limited to the number of columns.
     const stride = Math.max(1, Math.floor((values.length - first) / width));
     for (let i = first; i < values.length; i += stride) context.lineTo(x(times[i]), y(values[i]));
     context.stroke();

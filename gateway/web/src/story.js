@@ -1,12 +1,12 @@
-// What was asked, answered, seen and said in an episode, as a list. Of a running one the latest comes first; a finished one is read from
-// its beginning, and the list goes along with the moment that is shown.
+// Calls, answers, images and notes of an episode, as a list. For a running episode the latest entry is first. For a finished one the first
+// entry is first, and the list scrolls to the shown moment.
 
 import { element, words } from "./dom.js";
 
 const MOST_SHOWN = 400;
-/** Less is no thinking that a reader wants to know of. */
+/** Minimum thinking time that is shown. */
 const LEAST_THOUGHT_S = 0.5;
-/** Letters of a note or a refusal that are shown before its reader opens it. */
+/** Number of letters of a note or a refusal that are shown before the reader opens it. */
 const SHORT_NOTE = 280;
 
 /** @typedef {import("./message.js").Entry} Entry */
@@ -18,7 +18,7 @@ export class Story {
   /**
    * @param {import("./message.js").SceneHead} head
    * @param {{ seek: (time: number) => void, picture: (robot: string, time: number) => string } | null} recorded of a finished episode:
-   *   takes the page to a moment, and says where a picture is
+   *   moves the page to a moment, and returns the address of a picture
    */
   constructor(head, recorded) {
     this.head = head;
@@ -31,7 +31,7 @@ export class Story {
     /** @type {HTMLElement | undefined} */
     this.marked = undefined;
     /**
-     * Takes a further command of people's into the item of those before it, if such a one was the last entry.
+     * Adds a person's command to the item of earlier ones, if the last entry is such an item.
      * @type {((entry: CallEntry) => void) | null}
      */
     this.driven = null;
@@ -101,7 +101,7 @@ export class Story {
   }
 
   /**
-   * Begins the item of people's commands, 50 a second, which grows.
+   * Begins the item of people's commands, which grows by 50 a second.
    * @param {CallEntry} first
    * @param {HTMLElement} number
    * @param {HTMLElement} told
@@ -163,7 +163,7 @@ export class Story {
     seen.append(image);
   }
 
-  /** Marks what was told last at a moment. @param {number} time */
+  /** Marks the last entry before a moment. @param {number} time */
   follow(time) {
     const next = this.entries.findIndex((entry) => entry.time > time + 1e-6);
     const item = this.entries[(next < 0 ? this.entries.length : next) - 1]?.item;
@@ -175,7 +175,7 @@ export class Story {
     this.bringIntoSight();
   }
 
-  /** Scrolls the list alone: the page stays where its reader has it. */
+  /** Scrolls only the list, and not the page. */
   bringIntoSight() {
     const { node, marked } = this;
     if (!marked) return;
@@ -184,7 +184,7 @@ export class Story {
 }
 
 /**
- * Tells whether a call is one of the commands of a single step that people drive by.
+ * Returns true if a call is one of the single-step commands by which people drive.
  * @param {CallEntry} call
  */
 const isDriven = ({ ok, tool, reply }) => ok && tool === "together" && /"executed_steps":\s*1\D/.test(reply);
@@ -198,8 +198,8 @@ const parsed = (/** @type {string} */ json) => {
 };
 
 /**
- * Writes a value as JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing
- * that is null.
+ * Writes a value as readable JSON: rows of numbers on one line, numbers with six digits, and no null
+ * fields.
  */
 const text = (/** @type {unknown} */ value) => (typeof value === "string" ? value
   : JSON.stringify(value, (_, inner) => readable(inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
@@ -208,7 +208,7 @@ const readable = (/** @type {unknown} */ value) => {
   return typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(6)) : value;
 };
 
-/** Says what a note says that was used. @param {import("./message.js").Note} note */
+/** Describes the usage in a note. @param {import("./message.js").Note} note */
 export function used({ input_tokens: input, output_tokens: output, cached_tokens: cached, usd, seconds }) {
   /** @type {string[]} */
   const parts = [];
@@ -218,10 +218,10 @@ export function used({ input_tokens: input, output_tokens: output, cached_tokens
   return parts.join("; ");
 }
 
-/** Says a call in a few words. @param {CallEntry} call @param {any} asked @param {any} reply */
+/** Summarises a call in a few words. @param {CallEntry} call @param {any} asked @param {any} reply */
 function summary(call, asked, reply) {
   if (!call.ok) {
-    // The example that follows is for the policy; it is told where the call is opened.
+    // The following example is for the policy. It is shown when the call is opened.
     const [why] = reply.split("; arguments that work");
     return `refused: ${why.length > SHORT_NOTE ? `${why.slice(0, SHORT_NOTE)}...` : why}`;
   }

@@ -1,10 +1,10 @@
-// Wrist targets of a finished episode, which its steps do not have: the replies to its commands say them, in the robot's pelvis frame at
-// the command's end. While it is carried out, a target is fixed in the world.
+// Wrist targets of a finished episode, which its steps do not contain. They come from the replies to its commands, in the robot's pelvis
+// frame at the command's end. During a command, a target is fixed in the world.
 
 import { Quaternion, Vector3 } from "three";
 import { POSE, SIDES } from "./message.js";
 
-/** The tools whose replies say where wrists were to be; people's commands are of the second. */
+/** The tools whose replies contain wrist targets. People's commands use the second one. */
 const TELLING = ["move_wrists", "together"];
 
 /** @typedef {{ begin: number, end: number, pose: Float32Array, state: string }} Target */
@@ -13,7 +13,7 @@ const TELLING = ["move_wrists", "together"];
 export class Targets {
   /** @param {import("./message.js").WatchedScene} scene */
   constructor({ head, layout, frames }) {
-    /** By robot and side: targets in order, with the times between which they hold. */
+    /** By robot and side: targets in order, with the times of their beginning and end. */
     this.known = head.robots.map(() => SIDES.map(() => /** @type {Target[]} */ ([])));
     let begin = 0;
     let latest = 0;
@@ -34,7 +34,7 @@ export class Targets {
   }
 
   /**
-   * Returns the target of a hand at a time, or null where no command was under way that had one.
+   * Returns the target of a hand at a time, or null if no command with a target was being executed.
    * @param {number} time
    * @param {number} robot
    * @param {number} side
@@ -51,7 +51,7 @@ export class Targets {
   }
 
   /**
-   * Returns the distance of a wrist from its target in metres; `otherwise` where it has none.
+   * Returns the distance of a wrist from its target in metres; `otherwise` without a target.
    * @param {import("./message.js").Frame} frame
    * @param {number} robot
    * @param {number} side

@@ -1,10 +1,10 @@
-// The moment that is shown: of a running episode the newest, a little late so that motion is smooth; of a finished one what its reader wants.
+// The shown moment: of a running episode the newest, with a short delay so that motion is smooth; of a finished one the reader's choice.
 
 /** @typedef {import("./message.js").Frame} Frame */
 
 /**
- * Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about so
- * long.
+ * Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about this
+ * time.
  */
 const BEHIND_S = 0.5;
 
@@ -17,7 +17,7 @@ export class LiveTime {
     this.time = first.time;
   }
 
-  /** Takes in a step. @param {Frame} frame */
+  /** Receives a step. @param {Frame} frame */
   add(frame) {
     if (frame.time > last(this.frames).time) this.frames.push(frame);
   }
@@ -28,7 +28,7 @@ export class LiveTime {
    */
   pass(seconds) {
     const end = last(this.frames).time;
-    // The more there is to show, the faster it is shown, and never slower than it was.
+    // A longer backlog is shown faster, and never below the original speed.
     const speed = Math.max(1, (end - this.time) / BEHIND_S);
     const before = this.time;
     this.time = Math.min(end, this.time + seconds * speed);
@@ -37,7 +37,7 @@ export class LiveTime {
   }
 }
 
-/** Goes to and fro in a finished episode. */
+/** Moves forward and backward in a finished episode. */
 export class RecordedTime {
   /** @param {Frame[]} frames @param {number} [at] the moment at which it begins */
   constructor(frames, at) {
@@ -51,7 +51,7 @@ export class RecordedTime {
     this.seek(at || this.begin);
   }
 
-  /** Goes to a moment, or to the nearest that there is. @param {number} time */
+  /** Moves to a moment, or to the nearest one in the episode. @param {number} time */
   seek(time) {
     this.time = Math.min(Math.max(time, this.begin), this.end);
     this.moved = true;
@@ -79,7 +79,7 @@ export class RecordedTime {
 }
 
 /**
- * Returns the two frames around a time, and how far it is from the one to the other.
+ * Returns the two frames around a time, and its relative place between the two.
  * @param {Frame[]} frames
  * @param {number} time
  */
@@ -97,5 +97,5 @@ function between(frames, time) {
   return { from, to, share: span > 0 ? (time - from.time) / span : 1 };
 }
 
-/** Returns the last of some frames, of which there is one at least. @param {Frame[]} frames */
+/** Returns the last of at least one frame. @param {Frame[]} frames */
 const last = (frames) => frames[frames.length - 1];

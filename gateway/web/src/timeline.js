@@ -1,4 +1,4 @@
-// The time line of a finished episode: its phases as bands, calls, looks and notes as marks below them, and a slider over all of it.
+// The time line of a finished episode: its phases as bands, calls, looks and notes as marks below them, and a slider over the whole time.
 
 import { colour, element, words } from "./dom.js";
 
@@ -46,8 +46,8 @@ export class Timeline {
   }
 
   /**
-   * Makes the bands: each phase from where the one before it was reached to where it was, and where it never
-   * was, to the end.
+   * Makes the bands. A phase lasts from the time at which the one before was reached to its own time, or to the end if
+   * it was not reached.
    */
   bands() {
     const { begin, end } = this.time;
@@ -151,7 +151,7 @@ export class Timeline {
     this.time.seek(begin + ((event.clientX - left) / width) * (end - begin));
   }
 
-  /** Goes to the entry before or after the moment that is shown. @param {number} way -1 or 1 */
+  /** Moves to the entry before or after the shown moment. @param {number} way -1 or 1 */
   step(way) {
     const now = this.time.time;
     const times = [...new Set(this.entries.map(({ time_s }) => time_s))];
@@ -166,7 +166,7 @@ export class Timeline {
 }
 
 /**
- * Returns the entries with the time from which each lasted: a command for as long as its reply says, all else no time at all.
+ * Returns the entries with their start times. A command lasts as long as its reply states; other entries have no duration.
  * @param {import("./message.js").Entry[]} story
  * @param {number} begin
  * @returns {Stretch[]}

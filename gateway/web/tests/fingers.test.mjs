@@ -11,7 +11,7 @@ const TIPS = [4, 14, 9];
 
 /** @returns {import("../src/message.js").FingerJoint} */
 const joint = (at, axis, low, high) => ({ pose: [...at, 0, 0, 0, 1], axis, range_rad: [low, high] });
-/** The right hand as the server tells of it, of `sim/assets/robots/g1_dex3/robot.xml`. */
+/** The right hand, in the form of the server's messages, of `sim/assets/robots/g1_dex3/robot.xml`. */
 const RIGHT = [
   joint([0.067, -0.003, 0], [0, 1, 0], -1.0472, 1.0472),
   joint([-0.0025, 0.0193, 0], [0, 0, 1], -1.0472, 0.7243),
@@ -21,12 +21,12 @@ const RIGHT = [
   joint([0.1192, -0.0046, 0.0285], [0, 0, 1], 0, 1.5708),
   joint([0.0458, 0, 0], [0, 0, 1], 0, 1.7453),
 ];
-/** The left hand is the right one in a mirror. */
+/** The left hand, which mirrors the right one. */
 const LEFT = RIGHT.map(({ pose: [x, y, z], axis: [i, j, k], range_rad: [low, high] }) =>
   (j === 1 ? joint([x, -y, z], [i, j, k], low, high) : joint([x, -y, z], [i, j, k], -high, -low)));
 const HANDS = { left: LEFT, right: RIGHT };
 
-/** Returns a person's hand with the tips of a robot's whose joints are so, seen from a wrist that is somewhere, turned anyhow. */
+/** Returns a person's hand with the fingertips of a robot's hand at these joint angles, relative to a wrist with any pose. */
 function personWith(side, angles, wrist, turn) {
   const robot = new Fingers(side, HANDS[side]);
   robot.sought = [...angles];
@@ -68,7 +68,7 @@ test("a step of the hand is followed to 63 % in 0.15 s, however often is drawn",
   for (const rate of [15, 30, 90]) {
     const fingers = new Fingers("right", RIGHT);
     const positions = personWith("right", grasp.right, somewhere, turned);
-    // The solution is found at once; what is commanded follows.
+    // The solution is found immediately; the command follows with a delay.
     for (let frame = 0; frame < 20; frame += 1) fingers.follow(positions, turned, 0);
     assert.ok(fingers.angles.every((angle) => angle === 0), "no time has passed");
     for (let frame = 0; frame < Math.round(0.15 * rate); frame += 1) fingers.follow(positions, turned, 0.15 / Math.round(0.15 * rate));

@@ -67,7 +67,7 @@ test("a choice goes through an address, beside what else is in it", () => {
   assert.equal(withChoice("?text=a", NONE), "");
 });
 
-/** Fails unless a program takes what it is given on its standard input. */
+/** Fails unless a program accepts the text on its standard input. */
 function parses(program, words, input) {
   const { status, stderr, error } = spawnSync(program, words, { input, encoding: "utf8" });
   if (error && "code" in error && error.code === "ENOENT") console.log(`skipped: ${program} is not installed`);

@@ -1,4 +1,4 @@
-// Patterns of surfaces: their numbers are those of the server's renderers, and their means those of their functions: `npm test`.
+// Patterns of surfaces: their numbers equal those of the server's renderers, and their means those of their functions: `npm test`.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -16,7 +16,7 @@ test("a mean is that of its pattern", () => {
   const mod = (value, divisor) => value - divisor * Math.floor(value / divisor);
   const given = [...Object.values(PATTERN_NUMBERS), wave, Math.floor, Math.pow, mod, Number];
   for (const [name, { share, mean }] of Object.entries(PATTERNS)) {
-    // What is used of GLSL reads the same in JavaScript.
+    // The used part of GLSL is also valid JavaScript.
     const shareAt = new Function(...names, "p", `return ${share};`);
     let sum = 0;
     const count = 200_000;

@@ -1,4 +1,4 @@
-//! Spheres swept along segments, and the closest points of two of them.
+//! Capsules, which are spheres swept along segments, and the closest points of two capsules.
 
 use nalgebra::{Point3, Vector3};
 

@@ -130,7 +130,7 @@ impl<'m> Configuration<'m> {
         }
     }
 
-    /// Returns the centre of mass in the root's frame, m; the root's origin if nothing has mass.
+    /// Returns the centre of mass in the root's frame, m; the root's origin for a model without mass.
     pub fn center_of_mass(&self) -> Vector3<f64> {
         let mut moment = Vector3::zeros();
         let mut mass_kg = 0.0;

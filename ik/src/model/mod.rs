@@ -1,5 +1,5 @@
-//! A tree of joints with one degree of freedom each, frames fixed to them, and the masses they carry;
-//! and the same tree at one set of joint coordinates.
+//! A tree of joints with one degree of freedom each, frames fixed to the joints, and the masses that the
+//! joints carry. A configuration is the same tree at one set of joint coordinates.
 
 mod configuration;
 mod mjcf;

@@ -1,4 +1,4 @@
-//! Parts of a model: joints, frames fixed to them, and the masses they carry.
+//! Parts of a model: joints, frames fixed to joints, and masses that joints carry.
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 

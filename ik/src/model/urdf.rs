@@ -47,7 +47,7 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// Adds a link that moves with `owner`, at `pose` in that joint's frame, and everything below it.
+    /// Adds a link that moves with `owner`, at `pose` in that joint's frame, and all links below it.
     fn add_link(&mut self, name: &str, owner: Option<usize>, pose: Isometry3<f64>) -> Result<(), IkError> {
         self.frames.push(Frame { name: name.into(), joint: owner, joint_from_frame: pose });
         if let Some(link) = self.links.get(name) {

@@ -41,7 +41,7 @@ pub enum QpFailure {
 /// Problem data and work space for `n` variables.
 pub struct Qp {
     pub(super) n: usize,
-    /// Hessian H, of which the lower triangle is read.
+    /// Hessian H. Only its lower triangle is read.
     pub hessian: Mat<f64>,
     /// Linear cost c.
     pub linear: Vec<f64>,
@@ -151,7 +151,7 @@ impl Qp {
     }
 }
 
-/// Writer of rows, each with its owner.
+/// Writer of rows. Each row has an owner.
 pub(crate) struct Rows<'a, Owner> {
     pub qp: &'a mut Qp,
     pub owners: &'a mut Vec<Owner>,

@@ -16,8 +16,8 @@ const RECOVERY: f64 = 0.5;
 impl Solver {
     /// Sets up and solves the quadratic program; the displacement is in `self.qp.x`.
     ///
-    /// A violated barrier demands a recovery motion. The demand is limited to a share of what the joints
-    /// can do, and dropped to standing still if such demands contradict each other.
+    /// A violated barrier demands a recovery motion. The demand is limited to a share of the joints' maximum
+    /// motion. If such demands contradict each other, the joints stand still.
     pub(crate) fn displacement(
         &mut self,
         configuration: &Configuration,

@@ -1,5 +1,5 @@
-//! Complete solutions: steps with a clamped error and a line search, until the frames are reached or
-//! nothing moves.
+//! Complete solutions: steps with a clamped error and a line search, until the frames reach their targets or
+//! the joints no longer move.
 
 use super::report::{ClampedJoint, Outcome, SolveReport, saturated};
 use super::step::{Solver, frame_errors};
@@ -11,7 +11,7 @@ use crate::tasks::Task;
 pub struct SolveOptions {
     /// Maximum number of steps of one attempt.
     pub max_iterations: usize,
-    /// Further attempts from random coordinates after a stall; for planning, never for streaming.
+    /// Further attempts from random coordinates after a stall. They are for planning, never for streaming.
     pub restarts: usize,
     /// Seed of those coordinates.
     pub seed: u64,

@@ -16,12 +16,12 @@ use crate::qp::QpFailure;
 use crate::tasks::{ERROR_CLAMP, Task};
 
 const MAX_HALVINGS: usize = 5;
-/// Damping per joint that caution multiplies, 1/rad or 1/m.
+/// Damping per joint at a caution of 1, 1/rad or 1/m.
 const CAUTION: f64 = 1e-2;
 const MAX_CAUTION: f64 = 1e3;
 /// Relative growth of an objective that counts as rounding.
 const SAME: f64 = 1e-9;
-/// Violations from which on a step must correct them at once, without a line search, rad or m per step.
+/// Violations above which a step must correct them at once, without a line search, rad or m per step.
 const URGENT: f64 = 1e-4;
 
 impl Solver {

@@ -48,7 +48,7 @@ pub(crate) struct StepContext<'a> {
     pub error_clamp: Option<FrameError>,
 }
 
-/// Buffers of one evaluation, so that nothing allocates.
+/// Buffers of one evaluation, so that evaluations do not allocate.
 #[derive(Default)]
 pub(crate) struct TaskScratch {
     pub columns: Vec<(usize, Vector6<f64>)>,

@@ -1,4 +1,4 @@
-//! A step that moves does not allocate, whatever its tasks and constraints.
+//! A step that moves does not allocate, with any tasks and constraints.
 #![allow(unsafe_code, reason = "a global allocator that counts cannot be written without")]
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -8,8 +8,8 @@ use rapier3d::math::{Pose, Vector};
 use super::{JOINTS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// A robot's estimate of its own body, which is all that a controller may use: joint readings, link
-/// poses, centre of mass. The world frame is the robot's estimate of it.
+/// A robot's estimate of its own body: joint readings, link poses, centre of mass. A controller may use
+/// nothing else. The world frame is the robot's estimate of that frame.
 pub struct BodyEstimate {
     pub model: Arc<RobotModel>,
     pub q_rad: [f32; JOINTS],
@@ -24,9 +24,9 @@ pub struct BodyEstimate {
     /// Load of each arm on the trunk, as a force at its palm: the force of the world on the hand, and
     /// the inertia of the moving arm.
     pub hand_reaction_n: Sides<Vector>,
-    /// True if thumb and fingers press on something.
+    /// True if both thumb and fingers press on an object.
     pub hand_holds: Sides<bool>,
-    /// True if thumb or fingers press on something.
+    /// True if thumb or fingers press on an object.
     pub hand_presses: Sides<bool>,
     /// True if arms or fingers are commanded to move.
     pub arms_told: bool,
@@ -87,7 +87,7 @@ impl LinkMotion {
 }
 
 impl BodyEstimate {
-    /// Creates the estimate from joints, pelvis and the resulting link poses, with nothing in the hands.
+    /// Creates the estimate from joints, pelvis and the resulting link poses, with empty hands.
     pub(crate) fn of_motion(
         model: &Arc<RobotModel>,
         pelvis: &PelvisMotion,

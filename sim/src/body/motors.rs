@@ -22,7 +22,7 @@ pub struct MotorSetpoints {
 }
 
 impl MotorSetpoints {
-    /// Setpoints under which no motor exerts anything.
+    /// Setpoints at which every motor's effort is 0.
     pub const LIMP: MotorSetpoints = MotorSetpoints {
         q_rad: [0.0; JOINTS],
         qd_rad_s: [0.0; JOINTS],

@@ -80,7 +80,7 @@ impl Posed {
         }
     }
 
-    /// Returns the body estimate for a controller, with nothing in the hands.
+    /// Returns the body estimate for a controller, with empty hands.
     pub(crate) fn body(&self) -> BodyEstimate {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);

@@ -147,8 +147,8 @@ impl TreeBefore {
                     let before = self.velocity[parent];
                     accelerations[parent] + before.cross(velocity - before)
                 }
-                // As in `equations`: the degrees of freedom of a free link are the velocity of a moving
-                // point.
+                // This is as in `equations`: the degrees of freedom of a free link are the velocity of a
+                // moving point.
                 None if link.joint.dofs() == 6 => {
                     MotionVector { angular: DVec3::ZERO, linear: -velocity.angular.cross(velocity.linear) }
                 }

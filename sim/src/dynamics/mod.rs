@@ -45,7 +45,7 @@ use sleep::SleepingContacts;
 use solving::Solver;
 use trees::Trees;
 
-/// All moving things of a world.
+/// All moving bodies of a world.
 pub struct Dynamics {
     pub settings: Settings,
     trees: Trees,
@@ -104,8 +104,8 @@ impl Dynamics {
         self.collision.keep_colliders_apart(a, b);
     }
 
-    /// Lets two colliders touch whatever their masks, links and joints, with this friction. It must be called
-    /// before the first step.
+    /// Lets two colliders touch regardless of their masks, links and joints, with this friction. It must be
+    /// called before the first step.
     pub fn let_touch(&mut self, a: ColliderId, b: ColliderId, friction: Friction) {
         self.collision.let_touch(a, b, friction);
     }

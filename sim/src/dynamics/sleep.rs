@@ -1,9 +1,9 @@
-//! Sleep: free bodies that rest are left out of steps until something comes near.
+//! Sleep: free bodies at rest are left out of steps until a moving body comes near.
 //!
-//! A body falls asleep, with everything that is near it, when all of these have been still for a while. It
+//! A body falls asleep, together with all bodies near it, when all of them have been still for a while. It
 //! keeps its contacts, and its velocity is exactly zero. It wakes when the bounds of an awake body meet its
-//! own, or when its state is set. All of this depends on the state alone, so that restored worlds go on as
-//! they would have.
+//! own, or when its state is set. All of this depends on the state alone, so that restored worlds continue
+//! exactly like the original ones.
 
 use std::collections::BTreeSet;
 
@@ -64,7 +64,7 @@ impl Dynamics {
         collision.manifolds.sort_by_key(|manifold| manifold.colliders);
     }
 
-    /// Wakes all sleeping bodies whose bounds meet those of an awake one. All surfaces must be placed.
+    /// Wakes all sleeping bodies whose bounds meet those of an awake body. All surfaces must be placed.
     pub(super) fn wake_near(&mut self) {
         if !self.trees.all.iter().any(Tree::is_asleep) {
             return;
@@ -76,14 +76,14 @@ impl Dynamics {
         }
     }
 
-    /// Returns the sleeping one of two bodies of which the other is awake.
+    /// Returns the sleeping body of two, if the other one is awake.
     fn sleeper_beside_awake(&self, pair: [TreeId; 2]) -> Option<TreeId> {
         let [a, b] = pair.map(|id| self.trees.all[id.index()].is_asleep());
         (a != b).then(|| if a { pair[0] } else { pair[1] })
     }
 
-    /// Counts still steps at the end of a step, and lets bodies fall asleep that are ready, together with
-    /// everything that is near them.
+    /// Counts still steps at the end of a step. Bodies that are ready fall asleep, together with all bodies
+    /// near them.
     pub(super) fn fall_asleep(&mut self) {
         let mut is_ready = false;
         let (moving_v, final_v) = (&self.moving_v, &self.final_v);
@@ -99,7 +99,7 @@ impl Dynamics {
         }
     }
 
-    /// Returns the bodies that are ready to sleep and near nothing that is not.
+    /// Returns the bodies that are ready to sleep and near no body that is not ready.
     fn sleepers(&self) -> BTreeSet<TreeId> {
         let rest = |id: &TreeId| self.trees.all[id.index()].rest;
         let is_ready = |id: &TreeId| rest(id).is_some_and(Rest::is_ready);
@@ -194,7 +194,7 @@ mod tests {
         tree.set_base(at, velocity_m_s, DVec3::ZERO);
     }
 
-    /// A tower, and a box beside it, which is out of reach.
+    /// The box beside the tower is too far away to touch it.
     const TOWER: [[f64; 2]; 3] = [[0.0, 0.101], [0.0, 0.302], [1.0, 0.101]];
 
     #[test]

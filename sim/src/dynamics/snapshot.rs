@@ -42,7 +42,7 @@ struct PresentState<'a> {
 
 impl Dynamics {
     /// Returns a view of the present state for immediate serialisation. [`Dynamics::resting`] has the rest of
-    /// it.
+    /// the state.
     pub fn present(&self) -> impl Serialize {
         PresentState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
@@ -67,7 +67,7 @@ impl Dynamics {
     ///
     /// # Errors
     ///
-    /// Returns [`OtherWorld`] if the state does not fit; nothing changes then.
+    /// Returns [`OtherWorld`], and makes no change, if the state does not fit.
     pub fn restore(&mut self, state: &DynamicsState) -> Result<(), OtherWorld> {
         let trees = &mut self.trees.all;
         let fits = trees.len() == state.trees.len()

@@ -18,7 +18,7 @@ pub(super) struct Foot {
     pub point_m: DVec3,
     /// Heading of the foot since the robot has stood still.
     pub heading_rad: f64,
-    /// Certainty that the foot stands, from 0 (certainly not) to 1 (certainly).
+    /// Certainty that the foot stands: from 0 (certainly lifted) to 1 (certainly standing).
     pub contact_share: f64,
     /// Centre of pressure in the link's frame, filtered.
     pressure_m: Vector,
@@ -32,12 +32,12 @@ struct GroundWrench {
     moment_n_m: Vector,
 }
 
-/// Forces below which a foot carries nothing, and above which it certainly stands.
+/// Force below which a foot counts as lifted, and force above which it counts as standing.
 const LIFTED_N: f32 = 40.0;
 const STANDING_N: f32 = 110.0;
 const FORCE_FILTER_TIME_S: f32 = 0.006;
 const PRESSURE_FILTER_TIME_S: f32 = 0.015;
-/// Height above the other foot from which on a foot does not stand.
+/// Height above the other foot at which a foot no longer stands.
 const HIGHER_M: f32 = 0.012;
 /// Damping of the least squares for a wrench: a stretched leg cannot feel along itself.
 const WRENCH_DAMPING: f32 = 2e-4;

@@ -95,10 +95,10 @@ const HEADING_NOISE_RAD: f64 = 2e-3;
 const FLOOR_NOISE_M: f64 = 4e-3;
 /// Squared number of standard deviations beyond which a foot has slipped from its place.
 const SLIP_GATE: f64 = 9.0;
-/// Time of standing still, and maximum spin, from which on feet are used to estimate the heading.
+/// Minimum time of standing still, and maximum spin, for using the feet to estimate the heading.
 const STILL_S: f32 = 0.4;
 const STILL_RAD_S: f32 = 0.1;
-/// Certainty from which on a foot counts as standing on the floor.
+/// Minimum certainty at which a foot counts as standing on the floor.
 const SURE: f64 = 0.9;
 
 /// Standard deviations at the start.

@@ -66,7 +66,8 @@ fn a_gyros_bias_is_learnt_while_both_feet_stand() {
     assert!(heading_rad(&body.world_from_pelvis()).abs() < 3e-3);
 }
 
-/// On one leg the other foot's reading shows it, and its point of the ground is soon unknown.
+/// A robot on one leg notices from the torques that its other foot is in the air. The ground point of that
+/// foot is soon unknown.
 #[test]
 fn a_foot_that_carries_nothing_does_not_stand() {
     let mut readings = standing();
@@ -124,7 +125,7 @@ fn a_prediction_is_the_product_of_three_matrices() {
     check(&covariance, &product(&product(&step, &before), &transposed));
 }
 
-/// By the textbook, and for considered errors by Joseph's form.
+/// The textbook's formula, and for considered errors Joseph's form.
 #[test]
 fn a_measurement_is_josephs_form() {
     for considered in [&[][..], &[TURN + 2, GYRO_BIAS + 2][..]] {

@@ -74,7 +74,7 @@ impl BaseLimits {
 /// Drives of both legs, from the hip to the ankle.
 pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
-/// A controller of all motors of a robot, with nothing under it; see [`crate::World::drive_motors`].
+/// A controller of all motors of a robot, without a base controller; see [`crate::World::drive_motors`].
 pub trait MotorController {
     /// Returns the setpoints of the next control step. `upper_rad` are the targets of the joints above the
     /// hips, in action order.
@@ -107,8 +107,8 @@ pub trait Locomotion: Send {
         None
     }
 
-    /// Forgets everything, for a robot whose joints others drive. The next [`Locomotion::tick`] starts from
-    /// the posture in which it finds the robot.
+    /// Resets all state, for a robot with joints that others drive. The next [`Locomotion::tick`] starts from
+    /// the robot's posture at that time.
     fn let_go(&mut self);
 
     /// Serialises the internal state, for snapshots and the state hash.

@@ -62,7 +62,7 @@ pub(crate) fn add_equalities(
     Ok(())
 }
 
-/// Returns the weld of two ends; `None` between two parts of the world, where there is nothing to hold.
+/// Returns the weld of two ends; `None` between two parts of the world, which need no weld.
 fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
     let (a, b, a_from_b) = if a.link.is_some() { (a, b, a_from_b) } else { (b, a, a_from_b.inverse()) };
     let between_links = a.carrier_from_body * a_from_b * b.carrier_from_body.inverse();

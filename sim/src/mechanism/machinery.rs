@@ -14,7 +14,7 @@ pub(crate) struct Machinery {
     keys: Vec<Key>,
 }
 
-/// The name of the key in which a file begins.
+/// Name of the keyframe in which a file begins.
 pub(crate) const START: &str = "start";
 
 impl Machinery {
@@ -105,7 +105,7 @@ fn put(
     tree.set_base(world_from_body, velocity_m_s, spin_rad_s);
 }
 
-/// Takes the next numbers of a key, unless it has none.
+/// Takes the next numbers of a key, if the key has numbers.
 fn take<const N: usize>(rest: &mut &[f64]) -> Option<[f64; N]> {
     let (next, others) = rest.split_first_chunk()?;
     *rest = others;

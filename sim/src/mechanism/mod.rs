@@ -24,8 +24,8 @@ pub(crate) fn precise(pose: &Pose) -> DPose3 {
     DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
-/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the
-/// frame of either.
+/// Adds the collision shape of a geom, if the geom has one, to a link or to the world. The geom's pose is in
+/// the frame of the link or of the world.
 pub(crate) fn add_collider(
     dynamics: &mut Dynamics,
     geom: &Geom,

@@ -8,10 +8,10 @@ use rapier3d::prelude::SharedShape;
 
 use crate::mjcf::Geom;
 
-/// Number of horizontal directions tested from a point that may be enclosed; the staves of a vessel
-/// leave no gaps between them.
+/// Number of horizontal directions tested from a point that may be enclosed. No gap between the staves of a
+/// vessel is wide enough for all of them.
 const HEADINGS: u32 = 16;
-/// Length of test rays; no body is as wide as this.
+/// Length of test rays. No body is as wide.
 const SIGHT_M: f32 = 10.0;
 
 /// All colliding shapes of a rigid body, in its frame.
@@ -25,9 +25,9 @@ impl Solid {
         Solid { shapes: geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider).collect() }
     }
 
-    /// Returns the extent of the body at `world_from_body` along a world direction (a unit vector) from
-    /// the world's origin: that of its farthest point, whatever the shape. Returns negative infinity for
-    /// a body without colliding shapes.
+    /// Returns the extent of the body at `world_from_body` along a world direction (a unit vector) from the
+    /// world's origin. It is the extent of the body's farthest point; negative infinity for a body without
+    /// colliding shapes.
     pub fn reach_m(&self, world_from_body: &Pose, direction: Vector) -> f32 {
         let reaches_m = self.shapes.iter().filter_map(|(body_from_shape, shape)| {
             let world_from_shape = *world_from_body * *body_from_shape;

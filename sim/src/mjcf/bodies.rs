@@ -12,7 +12,7 @@ use rapier3d::prelude::MassProperties;
 use super::{Document, Geom, LinkJoint, Primitive, Site, pose, vector};
 use crate::{SimError, mass};
 
-/// A top-level body with everything on it.
+/// A top-level body, including all bodies that it carries.
 #[derive(Clone, Debug)]
 pub struct BodyTree {
     /// Parents before children.
@@ -29,7 +29,7 @@ pub struct BodyLink {
     /// Pose with the joint at 0.
     pub parent_from_link: DPose3,
     pub joint: LinkJoint,
-    /// True for a link that only carries one of several joints of the body on it, and is no body of the
+    /// True for a link that only carries one of several joints of the next body, and is not a body of the
     /// file.
     pub is_part: bool,
     /// Mass and inertia in the link's frame.
@@ -51,7 +51,7 @@ pub struct PlacedBody {
 }
 
 impl BodyTree {
-    /// Returns true if nothing in the tree moves.
+    /// Returns true if no part of the tree can move.
     pub fn is_fixed(&self) -> bool {
         self.links.iter().all(|link| link.joint == LinkJoint::Fixed)
     }
@@ -136,7 +136,7 @@ impl Document {
         Err(self.source.refuse_at(self.checked.bodies[id].geoms[plane], what))
     }
 
-    /// Checks that every joint moves something that has mass.
+    /// Checks that every joint moves a mass.
     fn check_masses(&self, trees: &[BodyTree], places: &[Place]) -> Result<(), SimError> {
         for (index, tree) in trees.iter().enumerate() {
             let mut carried_kg: Vec<f32> = tree.links.iter().map(|link| link.mass.mass()).collect();

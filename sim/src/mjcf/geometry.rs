@@ -59,7 +59,7 @@ pub struct Geom {
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
-    /// True if its mask, or a pair, lets it touch anything.
+    /// True if its mask, or a pair, lets it touch another geom.
     pub collides: bool,
     pub touches: Mask,
     pub drawn: bool,
@@ -68,9 +68,9 @@ pub struct Geom {
 
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
-/// Dimensions of the slab as which a plane collides: its thickness, which nothing passes, and its reach
-/// around nearby shapes. The plane is endless, whatever its drawn size, as in MuJoCo. Half-spaces have
-/// no mass centre and no bounds.
+/// Dimensions of the slab as which a plane collides: its thickness, which no object passes, and its reach
+/// around nearby shapes. Planes of any drawn size are endless, as in MuJoCo. Half-spaces have no mass centre
+/// and no bounds.
 const PLANE_THICKNESS_M: f32 = 2.0;
 const PLANE_REACH_M: f32 = 50.0;
 

@@ -265,7 +265,7 @@ impl Document {
         })
     }
 
-    /// Returns the range of efforts on a joint, by its own limit and by an actuator's range, if any.
+    /// Returns the range of efforts on a joint. Both the joint and an actuator may limit it.
     pub fn effort_range(&self, joint: &str, of_actuator: Option<[f64; 2]>) -> Option<[f64; 2]> {
         match (self.unread.effort.get(joint), of_actuator) {
             (Some([low, high]), Some([least, most])) => Some([low.max(least), high.min(most)]),
@@ -334,7 +334,7 @@ impl Document {
         Ok(AxisJoint { name, axis, placed_at: joint.ref_ })
     }
 
-    /// Returns a range if it limits anything; `what` is the limited quantity.
+    /// Returns a range if it limits a quantity; `what` is the quantity's name.
     fn limits(
         &self,
         what: &str,

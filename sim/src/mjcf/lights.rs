@@ -31,7 +31,7 @@ pub struct FileLight {
     pub kind: LightKind,
     /// Index of the body; 0 is the world.
     pub(crate) body: usize,
-    /// Position in the frame of the body, or of what the body is part of.
+    /// Position in the frame of the body, or of the body that this one is part of.
     pub position_m: Vector,
     /// Unit vector along which it shines.
     pub direction: Vector,

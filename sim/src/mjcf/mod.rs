@@ -63,7 +63,7 @@ impl PartialEq for Document {
     }
 }
 
-/// A parsed file. All its content is in effect; otherwise it would have been refused.
+/// A parsed file. All its content has an effect; a file with other content is refused.
 #[derive(Clone, Debug)]
 pub struct Document {
     pub file: String,
@@ -91,7 +91,7 @@ pub struct Document {
     lights: Option<FileLights>,
     looks: Looks,
     settings: FileSettings,
-    /// Pairs of geoms that touch whatever their masks.
+    /// Pairs of geoms that touch regardless of their masks.
     pub pairs: Vec<GeomPair>,
     /// All files that were read, each with a hash of its bytes.
     files: Vec<(PathBuf, u64)>,

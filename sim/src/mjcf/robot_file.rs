@@ -11,11 +11,11 @@ use super::geometry::between;
 use super::{BodyTree, Document, pose};
 use crate::SimError;
 
-/// Elements of which a described robot uses nothing.
+/// Elements that a described robot does not use.
 const LEFT_OUT: &[&str] = &["tendon", "pair", "deformable", "skin", "flex", "flexvert", "flexstrain"];
 
 impl Document {
-    /// Reads the file of a robot, of which nothing but bodies, joints and limits counts.
+    /// Reads the file of a robot. Only bodies, joints and limits count.
     ///
     /// # Errors
     ///
@@ -37,7 +37,8 @@ impl Document {
         self.checked.approximated.push(format!("`{}`: {what}", self.file));
     }
 
-    /// Removes all bodies except one top-level body and those on it, and all geoms and sites of the world.
+    /// Keeps one top-level body and the bodies that it carries. Removes all other bodies, and all geoms and
+    /// sites of the world.
     pub(crate) fn keep_tree(&mut self, root: usize) {
         let mut number = vec![None; self.model.bodies.len()];
         let (mut bodies, mut places, mut is_part) = (Vec::new(), Vec::new(), Vec::new());
@@ -65,7 +66,7 @@ impl Document {
         self.model.contact.excludes = excludes;
     }
 
-    /// Returns the tree of a document with one.
+    /// Returns the only tree of a document.
     pub(crate) fn robot_tree(&self) -> Result<BodyTree, SimError> {
         let tree = self.trees()?.into_iter().nth(1);
         tree.ok_or_else(|| self.unsupported("it has no body"))
@@ -106,8 +107,8 @@ impl Document {
         self.checked.bodies[1].joints.push(byte);
     }
 
-    /// Replaces the frame of a body by another one, which has the pose `body_from_new` in it. Nothing else
-    /// changes its place.
+    /// Replaces the frame of a body by another one, whose pose in the old frame is `body_from_new`. All parts
+    /// keep their places.
     pub(crate) fn reframe(&mut self, body: usize, body_from_new: DPose3) {
         let new_from_body = body_from_new.inverse();
         let on_it = self.model.bodies.iter_mut().filter(|entry| entry.parent == Some(body));

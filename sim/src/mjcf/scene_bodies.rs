@@ -1,4 +1,4 @@
-//! Bodies of a scene that can move, by name: what a task can ask for, and what stays room.
+//! Bodies of a scene that can move, by name. Tasks can refer to these; all other bodies are part of the room.
 
 use rapier3d::math::Pose;
 

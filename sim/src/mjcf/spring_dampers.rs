@@ -29,7 +29,7 @@ impl Document {
     }
 }
 
-/// Returns the inertia that the joint of a link moves: of everything on the link, and the armature.
+/// Returns the inertia that the joint of a link moves: that of all bodies on the link, and the armature.
 fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
     let mut of_link: Vec<Option<DPose3>> = vec![None; tree.links.len()];
     of_link[link] = Some(DPose3::IDENTITY);

@@ -281,7 +281,7 @@ fn masks_say_what_touches_what() {
     assert!(!geoms[1].touches.meets(geoms[1].touches), "it touches nothing of its own kind");
 }
 
-/// Joint positions are 0 where the file places the bodies, whatever its `ref` is.
+/// Joint positions are 0 where the file places the bodies, for any `ref`.
 #[test]
 fn a_joint_may_be_placed_elsewhere_than_at_0() {
     let body = r#"<worldbody><body><joint name="h" ref="0.5" range="0 2" springref="0.7"/>

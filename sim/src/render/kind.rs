@@ -73,7 +73,7 @@ fn on_gpu() -> Result<String, SimError> {
     Err(SimError::WithoutGpu)
 }
 
-/// Describes a hardware GPU; `None` if there is none or only software in its place.
+/// Describes a hardware GPU; `None` if there is none or only a software renderer.
 #[cfg(feature = "gpu")]
 fn on_real_gpu() -> Option<String> {
     super::gpu::is_real().then(on_gpu).and_then(Result::ok)

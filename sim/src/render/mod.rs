@@ -70,7 +70,7 @@ pub trait Renderer: Send {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     All,
-    /// Without depth and ids.
+    /// Colours, without depth and ids.
     Colours,
 }
 
@@ -105,7 +105,7 @@ pub struct Frame {
     pub height: u32,
     /// Three bytes a pixel, sRGB.
     pub rgb: Vec<u8>,
-    /// Distance along the optical axis at the pixel's centre; infinite if nothing is there.
+    /// Distance along the optical axis at the pixel's centre; infinite without a surface.
     pub depth_m: Vec<f32>,
     /// Id of the visible thing: 0 nothing, 1 the room, then robots, then objects.
     pub ids: Vec<u32>,
@@ -156,7 +156,7 @@ pub fn encode_grey_png(width: u32, height: u32, grey: &[u8]) -> Result<Vec<u8>, 
 /// Depth per step of a 16-bit sample.
 pub const DEPTH_UNIT_M: f64 = 0.001;
 
-/// Encodes depth as a 16-bit PNG file in units of [`DEPTH_UNIT_M`]. A sample is 0 if nothing is there or
+/// Encodes depth as a 16-bit PNG file in units of [`DEPTH_UNIT_M`]. A sample is 0 if there is no surface or
 /// the depth exceeds the range.
 ///
 /// # Errors

@@ -59,7 +59,7 @@ impl ArmMomentum {
 /// Computes the momenta of the arm's joints, of which `first` is the first, from the shoulder on.
 fn arm_momenta(body: &BodyEstimate, motions: &[LinkMotion], first: usize) -> [JointMomentum; ARM_JOINTS] {
     let model = &body.model;
-    // The first of the arm's links, whatever the order of its joints.
+    // The first of the arm's links, for any order of its joints.
     let joints = &model.joints[first..first + ARM_JOINTS];
     let shoulder = joints.iter().map(|joint| joint.link).min().unwrap_or_default();
     let is_beyond = |link: &LinkModel| link.parent.is_some_and(|parent| parent >= shoulder);

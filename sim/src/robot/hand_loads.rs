@@ -26,7 +26,7 @@ pub(super) struct HandLoads {
     payload: Sides<Payload>,
     /// Force of the world on each hand.
     force: Sides<HandForce>,
-    /// The same with the inertia of the moving arm.
+    /// This force with the inertia of the moving arm included.
     reaction: Sides<HandForce>,
     grip: Sides<Grip>,
 }
@@ -61,8 +61,8 @@ const LARGEST_WEIGHT_N: f32 = 35.0;
 /// Number of thumb joints among the seven joints of a hand.
 const THUMB_JOINTS: usize = 3;
 const GRIP_FILTER_TIME_S: f32 = 0.2;
-/// Minimum torque of a pressing finger: more than the weight of fingers, less than a grip's torque. A
-/// press continues down to half of it.
+/// Minimum torque of a pressing finger: more than the weight of fingers, less than a grip's torque. A press
+/// continues until the torque is half as large.
 const MIN_PRESS_N_M: f32 = 0.2;
 const STILL_PRESSES: f32 = 0.5;
 
@@ -101,17 +101,17 @@ impl HandLoads {
         self.force.each_ref().map(HandForce::force_n)
     }
 
-    /// Returns the same with the inertia of the moving arm: the load of each arm on the trunk.
+    /// Returns the force on each hand plus the inertia of the moving arm, which is the load on the trunk.
     pub(super) fn reaction_n(&self) -> Sides<Vector> {
         self.reaction.each_ref().map(HandForce::force_n)
     }
 
-    /// Returns true for hands whose thumb or fingers press on something.
+    /// Returns true for hands whose thumb or fingers press on an object.
     pub(super) fn presses(&self) -> Sides<bool> {
         self.grip.each_ref().map(|grip| grip.presses)
     }
 
-    /// Returns true for hands whose thumb and fingers both press on something.
+    /// Returns true for hands whose thumb and fingers both press on an object.
     pub(super) fn holds(&self) -> Sides<bool> {
         self.grip.each_ref().map(Grip::holds)
     }
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_force_on_a_hand_is_recovered_in_every_direction() {
-        // Except for the damping, which costs most along the arm.
+        // A quarter may be missing, because damping takes a part, most of it along the arm.
         let body = holding();
         for force_n in
             [Vector::new(0.0, 0.0, -12.0), Vector::new(10.0, 0.0, 0.0), Vector::new(-3.0, 8.0, 5.0)]

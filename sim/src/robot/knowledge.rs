@@ -48,7 +48,7 @@ impl Sensing {
     pub const TRUTH: Sensing = Sensing { state_estimate: StateSource::Truth, sensors: SensorModel::Ideal };
 }
 
-/// Sensors, their last readings, and the estimate from them.
+/// Sensors, their last readings, and the estimate from these readings.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct SelfKnowledge {
     sensors: Sensors,
@@ -82,7 +82,7 @@ impl SelfKnowledge {
         SelfKnowledge { sensors, readings, estimator, world_from_start }
     }
 
-    /// Runs one physics step. Returns the resulting body estimate, with nothing in its hands.
+    /// Runs one physics step. Returns the resulting body estimate, with empty hands.
     pub(super) fn update(&mut self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
         self.readings = self.sensors.read(tree, model, PHYSICS_DT_S);
         let Some(estimator) = &mut self.estimator else { return from_truth(model, tree, &self.readings) };
@@ -155,8 +155,8 @@ mod tests {
     use crate::body::posed::{Posed, model};
     use crate::dynamics::{DVec3, Dynamics, Settings};
 
-    /// The values read from the physics world are those of the model's kinematics for joints and pelvis.
-    /// The robot is in the air, touching nothing, with an arm on the move.
+    /// The values read from the physics world are those of the model's kinematics for joints and pelvis. The
+    /// robot is in the air without contacts, with a moving arm.
     #[test]
     fn poses_and_velocities_are_those_of_the_model() {
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
@@ -185,7 +185,7 @@ mod tests {
         }
         assert!((sensed.com_m - body.com_m).length() < 1e-4);
         let error_m_s = (sensed.com_velocity_m_s - body.com_velocity_m_s).length();
-        // To the order of one physics step.
+        // They agree to the order of one physics step.
         assert!(error_m_s < 0.01, "{} {}", sensed.com_velocity_m_s, body.com_velocity_m_s);
     }
 }

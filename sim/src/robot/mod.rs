@@ -84,7 +84,7 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
-    /// Replaces the sensors and the knowledge from them. The robot is assumed to have stood still until
+    /// Replaces the sensors and all knowledge that they gave. The robot is assumed to have stood still until
     /// now, at the pose `told`.
     pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, told: &Pose, sensing: Sensing, seed: u64) {
         let tree = dynamics.tree(self.tree);

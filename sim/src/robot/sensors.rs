@@ -20,9 +20,9 @@ pub enum SensorModel {
     Ideal,
     /// Noise, bias and latency of a Unitree G1.
     G1,
-    /// The same with twice the noise and bias.
+    /// A G1's sensors with twice the noise and bias.
     G1Twice,
-    /// The same with four times the noise and bias.
+    /// A G1's sensors with four times the noise and bias.
     G1Fourfold,
 }
 

@@ -12,7 +12,7 @@ use crate::estimate::JointReadings;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
 
-/// Values that a robot senses, in frames of its own. A reply or a policy may use only these and
+/// Values that a robot senses, in its own frames. A reply or a policy may use only these and
 /// [`RobotTruth::fallen`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
@@ -48,8 +48,8 @@ pub struct RobotTruth {
     pub world_from_wrist: Sides<Pose>,
     /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub world_from_camera: Pose,
-    /// The same one control step earlier; `None` before the first step and where it is not known. Recordings
-    /// leave it out, since the step before has it.
+    /// Pose of the camera one control step earlier; `None` before the first step and where it is not known.
+    /// Recordings leave it out, since the step before has it.
     #[serde(skip)]
     pub world_from_camera_before: Option<Pose>,
     /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true: nothing puts a
@@ -73,7 +73,7 @@ impl RobotTruth {
 }
 
 impl Robot {
-    /// Returns the sensed values and the poses derived from them.
+    /// Returns the sensed values and the poses derived from these values.
     pub(crate) fn sensed(&self) -> RobotSensed {
         let body = &self.body;
         let world_from_pelvis = body.world_from_pelvis();
@@ -138,7 +138,7 @@ impl Robot {
         RobotCommand { upper_rad, base: self.memory.base }
     }
 
-    /// Returns the command under which the robot stays as it is, by its encoders and its estimate of its
+    /// Returns the command that keeps the robot in its present state, by its encoders and its estimate of its
     /// pelvis.
     pub(crate) fn rest_command(&self) -> RobotCommand {
         let base = BaseCommand::standing(self.body.world_from_pelvis().translation.z);

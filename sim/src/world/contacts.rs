@@ -19,7 +19,7 @@ struct Press {
     force_n: Vector,
 }
 
-/// A point at which a robot pressed on something.
+/// A point at which a robot pressed on another body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotPress {
     /// The robot's link.
@@ -90,7 +90,7 @@ impl World {
         })
     }
 
-    /// Returns the points at which a robot's links pressed on anything else in the last step.
+    /// Returns the points at which a robot's links pressed on other bodies in the last step.
     pub fn presses_of(&self, robot: usize) -> Vec<RobotPress> {
         let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
         let press = |touch: &ContactPoint| {

@@ -77,8 +77,7 @@ impl World {
         self.planned_pushes = planned.into_iter().map(push).collect();
     }
 
-    /// Multiplies the mass of an object and everything that moves on it by `factor`. It is part of the
-    /// set-up.
+    /// Multiplies the mass of an object and of all its moving parts by `factor`. It is part of the set-up.
     pub fn scale_mass(&mut self, object: &str, factor: f64) {
         for index in self.parts_of(object) {
             let Some(link) = self.objects[index].link else { continue };
@@ -89,7 +88,7 @@ impl World {
         }
     }
 
-    /// Scales an object and everything that moves on it to this total mass. It is part of the set-up.
+    /// Scales an object and all its moving parts to this total mass. It is part of the set-up.
     pub fn set_mass(&mut self, object: &str, mass_kg: f64) {
         let link_kg = |index: usize| {
             let link = self.objects[index].link?;
@@ -99,15 +98,14 @@ impl World {
         self.scale_mass(object, mass_kg / now_kg);
     }
 
-    /// Reduces the friction of an object and everything that moves on it to this share. It is part of
-    /// the set-up.
+    /// Reduces the friction of an object and of all its moving parts to this share. It is part of the set-up.
     pub fn leave_friction(&mut self, object: &str, share: f64) {
         for index in self.parts_of(object) {
             self.dynamics.leave_friction(Owner::Object(index).tag(), share);
         }
     }
 
-    /// Returns the indices of an object and everything that moves on it.
+    /// Returns the indices of an object and of all its moving parts.
     fn parts_of(&self, object: &str) -> Vec<usize> {
         let is_part = |name: &str| {
             name.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -160,7 +158,7 @@ impl World {
         tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
     }
 
-    /// Returns true if a robot overlaps with anything else at its present pose.
+    /// Returns true if a robot overlaps with another body at its present pose.
     ///
     /// # Panics
     ///

@@ -7,7 +7,7 @@ use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction, Mask};
 use crate::mechanism::{add_collider, rounded};
 use crate::mjcf::{Geom, Gloss, Primitive};
 
-/// Cosine of the tilt below which a plane carries things that fall on it.
+/// Cosine of the maximum tilt of a plane that carries fallen objects.
 const CARRIES_COSINE: f64 = 0.5;
 /// MJCF's defaults.
 const PLAIN: Friction = Friction {
@@ -20,9 +20,9 @@ const PLAIN: Friction = Friction {
 };
 
 impl World {
-    /// Puts an endless plane under the lowest shape of the scene, unless the scene has such a plane itself.
-    /// Exported rooms have boxes for floors, and anything that goes over the edge of one would fall forever.
-    /// In a scene without colliders it is at z = 0, where robots are put. The plane is not drawn.
+    /// Puts an endless plane under the lowest shape of the scene, unless the scene already has such a plane.
+    /// Exported rooms have boxes for floors, and an object that goes over the edge would fall forever. In a
+    /// scene without colliders the plane is at z = 0, where robots are put. It is not drawn.
     pub(super) fn lay_ground(&mut self) {
         // No joint moves a plane.
         let carries = |(collider, at): (&Collider, DPose3)| {
@@ -31,8 +31,8 @@ impl World {
         if self.dynamics.colliders().any(carries) {
             return;
         }
-        // Moving things count, too: none may start within the ground. Walls that are planes have no
-        // lowest point.
+        // Moving bodies count, too: none may start within the ground. Walls that are planes have no lowest
+        // point.
         let shapes = self.dynamics.colliders().filter(|(collider, _)| !collider.endless);
         let bottom_m = |(collider, at): (&Collider, DPose3)| {
             (collider.shape.compute_aabb(&rounded(&at)).mins.z, collider.friction)

@@ -71,7 +71,7 @@ fn where_the_world_is_reaches_no_robot() {
     }
 }
 
-/// With the simulator's own state, the same robot knows its true place, whatever its initial estimate.
+/// With the simulator's own state, the same robot knows its true place, for any initial estimate.
 #[test]
 fn the_simulators_state_is_not_misled() {
     let mut world = misled(PLACE_M, YAW_RAD, Sensing::TRUTH);
@@ -81,7 +81,7 @@ fn the_simulators_state_is_not_misled() {
     assert!(believed.translation.truncate().length() > 40.0 && heading_rad(&believed) > 1.0);
 }
 
-/// The command under which a robot stays as it is follows from its readings and from its estimate of its
+/// The command that keeps a robot in its present state follows from its readings and its estimate of its
 /// pelvis.
 #[test]
 fn a_robot_stays_as_it_senses_itself() {

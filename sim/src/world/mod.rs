@@ -133,18 +133,18 @@ impl World {
         Ok(world)
     }
 
-    /// Builds a scene with only the content of its own file. It begins in its key `start`. Its actuators
-    /// follow that key's controls, and from the time of every later key those of that key.
+    /// Builds a scene with only the content of its own file. The scene begins in its key `start`. Its
+    /// actuators follow that key's controls, and from the time of every later key that key's controls.
     ///
     /// # Errors
     ///
-    /// Returns an error if the scene contains something unsupported.
+    /// Returns an error if the scene contains an unsupported element.
     pub fn of_scene(scene: Document) -> Result<World, SimError> {
         World::furnished(&scene, &Pose::IDENTITY, true)
     }
 
-    /// Builds the world as [`World::of_scene`] does, with the scene's own origin at `world_from_scene`. Its
-    /// free bodies sleep while they rest far from everything else, if they may.
+    /// Builds the world like [`World::of_scene`], with the scene's own origin at `world_from_scene`. Its free
+    /// bodies sleep while they rest far from all other bodies, if they may.
     fn furnished(scene: &Document, world_from_scene: &Pose, may_sleep: bool) -> Result<World, SimError> {
         let gravity_m_s2 = gravity_m_s2(scene, world_from_scene);
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
@@ -253,7 +253,7 @@ impl World {
         &self.robots
     }
 
-    /// Returns the command under which a robot stays as it is, by its own readings.
+    /// Returns the command that keeps a robot in its present state, by its own readings.
     pub fn rest_command(&self, robot: usize) -> RobotCommand {
         self.robots[robot].rest_command()
     }

@@ -15,7 +15,7 @@ pub struct Snapshot {
     control_steps: u64,
 }
 
-/// Initial capacity for serialised dynamics: more than three robots in a kitchen take, so that a hash
+/// Initial capacity for serialised dynamics. It is sufficient for three robots in a kitchen, so that a hash
 /// allocates once.
 const DYNAMICS_BYTES: usize = 1 << 16;
 

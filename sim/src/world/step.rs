@@ -21,7 +21,7 @@ pub struct Step {
     pub objects: Vec<ObjectStep>,
     /// Hands that touch an object; hands that touch none have no entry.
     pub touches: Vec<Touch>,
-    /// Robots that touch an object with any part of them, hands included.
+    /// Robots that touch an object with any of their parts, including hands.
     pub body_touches: Vec<BodyTouch>,
 }
 

@@ -17,8 +17,8 @@ pub const FASTEST_M_S: f64 = 25.0;
 /// put in.
 pub const MAX_ENERGY_SHARE: f64 = 0.05;
 pub const WINDOW_S: f64 = 0.2;
-/// Minimum energy that the share refers to: the energy that a robot of 35 kg gains in a fall of 30 cm.
-/// Pushing bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
+/// Minimum energy for computing the share: the energy that a robot of 35 kg gains in a fall of 30 cm. Pushing
+/// overlapping bodies apart lifts such a robot out of the tolerated depth with less than 5 % of this energy.
 pub const MIN_SCALE_J: f64 = 100.0;
 /// Maximum overlap, and the maximum time for which it may be exceeded.
 pub const DEEP_M: f64 = 0.02;
@@ -55,7 +55,7 @@ pub struct Extremes {
 pub struct Watch {
     pub extremes: Extremes,
     window: VecDeque<EnergyBalance>,
-    /// Pairs that overlap by too much, and the number of physics steps so far.
+    /// Pairs that overlap by too much, and the number of physics steps since the start.
     deep: BTreeMap<[ColliderId; 2], u32>,
 }
 

@@ -90,7 +90,7 @@ fn robots_stand_in_a_scene_of_nothing() {
     }
 }
 
-/// A floor that is a box ends, but a thing that goes over its edge comes to rest on a ground below.
+/// A floor that is a box ends, but an object that goes over its edge comes to rest on a ground below.
 #[test]
 fn what_goes_over_the_edge_of_a_box_lands_below_it() {
     let bottle = |name: &str, x_m: f32| ObjectPlacement {

@@ -73,7 +73,7 @@ fn pixel(frame: &Frame, [column, row]: [usize; 2]) -> [u8; 3] {
     frame.rgb[first..first + 3].try_into().expect("three bytes")
 }
 
-/// Returns the name of the colour that a pixel has, in whatever light.
+/// Returns the name of a pixel's colour under any light.
 fn name(rgb: [u8; 3]) -> &'static str {
     let [red, green, blue] = rgb.map(f32::from);
     match () {

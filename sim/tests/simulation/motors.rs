@@ -1,4 +1,5 @@
-//! Motors: their maximum speed, whatever the command, and setpoints in place of drives and base controller.
+//! Tests of motors: their maximum speed under any command, and setpoints that replace drives and base
+//! controller.
 
 use tandem_sim::{
     ARM_COLUMNS, CONTROL_DT_S, JOINTS, MotorSetpoints, PHYSICS_DT_S, RobotCommand, RobotPlacement, Side,

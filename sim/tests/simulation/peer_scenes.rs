@@ -1,5 +1,5 @@
-//! The scenes for comparing Tandem's physics with MuJoCo: the reader finds the same bodies, masses and
-//! coordinates in them. Their sensors' readings stay within the tolerance recorded with MuJoCo's readings.
+//! The scenes for comparing Tandem's physics with MuJoCo. The reader finds the same bodies, masses and
+//! coordinates as MuJoCo. The sensors' readings stay within the tolerance recorded with MuJoCo's readings.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 use tandem_sim::mjcf::{BodyLink, BodyTree, Document, LinkJoint};
 use tandem_sim::{CONTROL_HZ, Step, Vector, World};
 
-/// Returns MuJoCo's recorded data of each scene, and the scene's file beside it.
+/// Returns each scene's file and the data recorded with MuJoCo.
 fn references() -> Vec<(PathBuf, Value)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/peers/scenes");
     let entries = std::fs::read_dir(&folder).expect("the folder of the scenes");

@@ -29,7 +29,7 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     }
 }
 
-/// Returns a floor, and something that moves.
+/// Returns a floor and a moving object.
 fn floor_and(mesh: TriangleMesh) -> Scenery {
     let mut scenery = scenery(vec![floor(), (mesh, Pose::IDENTITY)]);
     scenery.parts[1].carrier = Carrier::Object(0);
@@ -136,7 +136,7 @@ fn sphere_depth_is_that_of_the_ray() {
         0.008,
         |ray| {
             // |depth * ray + distance * z|^2 = radius^2, the nearer solution;
-            // rays that graze the sphere are left out.
+            // Rays that graze the sphere are left out.
             let (a, b) = (ray.length_squared(), -distance_m);
             let discriminant = b * b - a * (distance_m * distance_m - radius_m * radius_m);
             (discriminant > 0.5 * radius_m * radius_m).then(|| (-b - discriminant.sqrt()) / a)
@@ -188,7 +188,7 @@ fn ids_name_the_nearest_thing() {
         (Vector::new(-0.3, 0.0, 0.0), 1),
         (Vector::new(0.24, 0.06, 0.2), 2),
         (Vector::new(0.3, 0.0, 0.55), 3),
-        // Below the sphere, which hides the box.
+        // This pixel is below the sphere, which hides the box.
         (Vector::new(0.3, 0.0, 0.2), 2),
     ] {
         let hidden = id == 2 && point_m.x == 0.3;
@@ -199,7 +199,7 @@ fn ids_name_the_nearest_thing() {
 
 #[test]
 fn neighbouring_triangles_leave_no_gap() {
-    // Within the image of a closed shape nothing of the floor behind it may show, whichever way it is turned.
+    // Within the image of a closed shape no part of the floor behind it may show, from any direction.
     for step in 0..24 {
         let rotation =
             Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);

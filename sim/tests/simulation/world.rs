@@ -30,7 +30,7 @@ fn world() -> World {
     World::new(&kitchen()).expect("embedded files load")
 }
 
-/// Returns the commands of both robots waving their arms in front of them, by control step.
+/// Returns the commands of two robots that wave their arms in front of their bodies, by control step.
 fn waving(rest: &[RobotCommand], step: u64) -> Vec<RobotCommand> {
     let time_s = step as f32 * CONTROL_DT_S;
     let wave = |joint: usize, robot: usize| {
@@ -38,7 +38,7 @@ fn waving(rest: &[RobotCommand], step: u64) -> Vec<RobotCommand> {
     };
     let mut commands = rest.to_vec();
     for (robot, command) in commands.iter_mut().enumerate() {
-        // Shoulder pitch and elbow of both arms: they swing in front of the body and touch nothing.
+        // Shoulder pitch and elbow of both arms: they swing in front of the body without contacts.
         for joint in [0, 3, 7, 10] {
             command.upper_rad[joint] += wave(joint, robot);
         }

@@ -12,8 +12,8 @@ use crate::single::{self, Subject};
 use crate::teams::{carrying, holding, placing};
 
 /// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
-/// Single robots come first, then two that carry something between them, if they have fingers. Calls `done`
-/// after each case.
+/// Single robots come first, then two robots with fingers that carry an object together. Calls `done` after
+/// each case.
 ///
 /// # Errors
 ///

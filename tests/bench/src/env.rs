@@ -39,8 +39,8 @@ pub struct EnvCase {
     pub threads: usize,
     /// Steps of environments per second, of all worlds together.
     pub steps_per_s: Spread,
-    /// Control steps per second of such worlds in turn on one thread, with physics, sensing and balance,
-    /// and nothing around them.
+    /// Control steps per second of such worlds, one after another on one thread, with physics, sensing and
+    /// balance, and without any other work.
     pub core_steps_per_s: Spread,
     /// Ratio of the first to the second, each measured right after the other.
     pub of_core: Spread,
@@ -103,7 +103,7 @@ fn measure(task: &Task, threads: usize) -> Result<EnvCase, BenchError> {
     })
 }
 
-/// Rate of steps, and processor time of this thread for all of them.
+/// Rate of steps, and this thread's processor time for all steps.
 struct Pace {
     steps_per_s: f64,
     busy_s: f64,

@@ -138,7 +138,7 @@ fn close(commands: &mut [RobotCommand], closed_share: f32) {
     }
 }
 
-/// Checks that no robot fell and nothing was dropped: otherwise the time is that of another situation.
+/// Checks that no robot fell and no object was dropped. Otherwise the time is that of another situation.
 fn check(world: &World, situation: Situation) {
     let present = world.present();
     for (index, robot) in present.robots.iter().enumerate() {

@@ -86,7 +86,7 @@ pub fn pictures(
 /// The views of a set of images.
 type Views<'a> = dyn Fn(&Step) -> Vec<CameraView> + 'a;
 
-/// Renderer of an image: all of it, or its colours alone, as learned policies use them.
+/// Renderer of an image: of all its channels, or of its colours alone, which learned policies use.
 type Draw = fn(&mut dyn Renderer, &Step, &CameraView);
 
 fn whole(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {

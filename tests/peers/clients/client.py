@@ -1,4 +1,4 @@
-"""Drives a running server as learned policies do: MessagePack, numpy, one call per chunk; then one operator per robot.
+"""Drives a running server like learned policies: MessagePack, numpy, one call per chunk; then one operator per robot.
 
     pip install -r tests/peers/clients/client.txt
     tandem serve --max-episodes 16 &
@@ -23,7 +23,7 @@ SHAPE = (240, 320)
 
 
 def call(url, body, token=TOKEN, **headers):
-    """One request in MessagePack, and its reply."""
+    """Sends a request in MessagePack, and returns its reply."""
     headers = {"content-type": "application/msgpack", **headers}
     if token:
         headers["authorization"] = f"Bearer {token}"
@@ -40,7 +40,7 @@ def start(server, **fields):
 
 
 def standing_rows(robot, steps):
-    """Joint targets that a robot has already, so that it stands as it stands."""
+    """Present joint targets of a robot, with which it keeps its posture."""
     angles = robot["joint_positions_rad"]
     arm = lambda side: [
         angles[f"{side}_{joint}_joint"]
@@ -54,7 +54,7 @@ def standing_rows(robot, steps):
 
 
 def check_pictures(tools):
-    """Every form of a picture holds the same pixels, and depth what is measured at them."""
+    """Checks that all forms of an image contain the same pixels, and that depth equals the measured depth."""
     raw = call(f"{tools}/observe", {"images": "rgb", "depth": "float16"})
     files = call(f"{tools}/observe", {"depth": "png16"})
     for index in range(2):
@@ -78,7 +78,7 @@ def check_pictures(tools):
 
 
 def check_chunks(tools):
-    """One call steps and returns what is seen then; a repeated one steps once."""
+    """Checks that one call steps and returns the observation, and that a repeated call steps only once."""
     state = call(f"{tools}/observe", {})
     for number in range(5):
         chunks = [{"robot": robot["robot"], "rows": standing_rows(robot, 20).tolist()} for robot in state["states"]]
@@ -97,7 +97,7 @@ def check_chunks(tools):
 
 
 def check_operators(server):
-    """Two clients, a robot each, in lockstep."""
+    """Checks two clients, each with one robot, in lockstep."""
     started, tools = start(server, operators="per_robot", talk=True, patience_s=20)
     steps = {}
 

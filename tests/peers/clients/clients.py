@@ -1,4 +1,4 @@
-"""Checks a running server with the official clients of its faces: MCP (the Python SDK, one major version or the other, and the
+"""Checks a running server with the official clients of its interfaces: MCP (the Python SDK, one major version or the other, and the
 inspector), the types and strict modes of the OpenAI and Anthropic SDKs, and the OpenAPI validator.
 
     pip install -r tests/peers/clients/clients.txt                 # or, in another environment, -r tests/peers/clients/clients_mcp2.txt
@@ -117,7 +117,7 @@ def check_openapi(url):
 
 
 def field(value, *names):
-    """An attribute that one major version of the SDK calls otherwise than the other."""
+    """An attribute whose name differs between the two major versions of the SDK."""
     return next(getattr(value, name) for name in names if hasattr(value, name))
 
 
@@ -126,7 +126,7 @@ MCP_PATHS = ("/mcp", "/mcp?output=structured")
 
 
 async def play(path, list_tools, call, get_prompt, mcp_error):
-    """The same episode by any client."""
+    """Plays the same episode by any client."""
     tools = {tool.name: tool for tool in (await list_tools()).tools}
     hints = tools["observe"].annotations
     assert field(hints, "readOnlyHint", "read_only_hint") is True, hints

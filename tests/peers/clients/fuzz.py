@@ -1,4 +1,4 @@
-"""Calls a running server with what its own OpenAPI description allows and with what it does not, by `schemathesis`, all checks.
+"""Sends valid and invalid calls by its OpenAPI description to a running server, by `schemathesis` with all checks.
 
     pip install -r tests/peers/clients/fuzz.txt
     tandem serve --max-episodes 512 &
@@ -47,7 +47,7 @@ def held(url):
 
 
 def schemathesis(url, document, folder, config, flags):
-    """Whether every check passes, and on how many requests."""
+    """Returns whether every check passes, and the number of requests."""
     (folder / "openapi.json").write_text(json.dumps(document))
     (folder / "schemathesis.toml").write_text(config)
     command = ["schemathesis", "--config-file", folder / "schemathesis.toml", "run", folder / "openapi.json"]
@@ -60,7 +60,7 @@ def schemathesis(url, document, folder, config, flags):
 
 
 def fuzz_one(url, document, operation, folder):
-    """Whether every check passes on one operation, and its commands are carried out; on how many requests."""
+    """Returns whether every check passes on one operation and its commands are executed, and the number of requests."""
     # An episode of its own, so that one that ends is not missed by the others.
     episode = new_episode(url)
     config = f'[parameters]\n"path.episode_id" = "{episode}"\n'
@@ -76,7 +76,7 @@ def fuzz_one(url, document, operation, folder):
 
 
 def fuzz_together(url, document, folder):
-    """Whether every check passes on all operations together, by which episodes are deleted; on how many requests."""
+    """Returns whether every check passes on all operations together, which delete episodes, and the number of requests."""
     document = json.loads(json.dumps(document))
     shared = [new_episode(url) for _ in range(SHARED_EPISODES)]
     for path in document["paths"].values():
@@ -93,14 +93,14 @@ def fuzz_together(url, document, folder):
 
 
 def description(url):
-    """The server's OpenAPI description, with what JSON Schema cannot say left out."""
+    """The server's OpenAPI description, narrowed where JSON Schema cannot express a rule."""
     document = read(f"{url}/v1/openapi.json")
 
     def body(tool):
         post = document["paths"][f"/v1/episodes/{{episode_id}}/tools/{tool}"]["post"]
         return post["requestBody"]["content"]["application/json"]["schema"]["properties"]
 
-    # That robots have equally many rows is said in fifty alternatives, for which the generator takes minutes; one robot has.
+    # Fifty alternatives state that robots have equally many rows. The generator would take minutes, so only one robot has rows.
     planned = body("send_plan")["commands"]["items"]["anyOf"]
     chunks = [body("send_joint_chunk")]
     chunks += [one["properties"]["arguments"]["properties"] for one in planned if one["properties"]["tool"]["const"] == "send_joint_chunk"]

@@ -1,4 +1,4 @@
-"""Kills `tandem` at random moments while it records, and while it evaluates and draws pictures; looks at what is left.
+"""Kills `tandem` at random moments while it records, evaluates and draws pictures, and checks the remaining files.
 
     cargo build --release
     python tests/peers/clients/kills.py [KILLS] [SEED]          # 20 kills while recording and 5 each of the others
@@ -33,7 +33,7 @@ def tandem(*words):
 
 
 def killed(command, after_s):
-    """Whether it was still running when it was killed."""
+    """Returns whether it was still running when it was killed."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         process.wait(timeout=after_s)
@@ -49,7 +49,7 @@ def run(command):
 
 
 def steps_in(text):
-    """How many control steps `replay --verify` found in a recording."""
+    """Returns the number of control steps that `replay --verify` found in a recording."""
     return int(text.split("verified: ")[1].split()[0])
 
 
@@ -65,7 +65,7 @@ def post(url, body):
 
 
 def steps_before_kill(chance, seed, runs):
-    """How many control steps a server had answered for when it was killed, called without a pause meanwhile."""
+    """Returns the number of control steps that a server had answered when it was killed, under calls without a pause."""
     command = tandem("serve", "--listen", "127.0.0.1:0", "--runs", runs, "--renderer", "cpu")
     server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     line = next(line for line in server.stderr if "http://" in line)
@@ -85,7 +85,7 @@ def steps_before_kill(chance, seed, runs):
 
 
 def recordings(chance, kills, work):
-    """Kills a server that records; what is left becomes whole and verifies, and few steps are missing."""
+    """Kills a server that records. The remaining file can be recovered and verified, and few steps are missing."""
     faults, missing = [], []
     for number in range(kills):
         runs = work / f"recording{number}"
@@ -117,14 +117,14 @@ def tree(folder):
 
 
 def scores(folder):
-    """Of every episode, what it ended with."""
+    """Returns the result of every episode."""
     episodes = {path.name: json.loads(path.read_text()) for path in sorted((folder / "episodes").glob("*.json"))}
     keys = ("state_hash", "phases", "steps", "ended")
     return {name: {key: str(find(episode, key)) for key in keys} for name, episode in episodes.items()}
 
 
 def find(value, key):
-    """The first field of that name, however deep."""
+    """Returns the first field of that name at any depth."""
     if isinstance(value, dict):
         if key in value:
             return value[key]
@@ -135,7 +135,7 @@ def find(value, key):
 
 
 def resumed(chance, kills, work, name, command, outcome):
-    """Kills `command` again and again in one folder, lets it end, and compares with a run that nobody stopped."""
+    """Kills `command` repeatedly in one folder, lets it end, and compares the folder with an uninterrupted run."""
     stopped, whole = work / f"{name}-stopped", work / f"{name}-whole"
     hits = sum(killed(command(stopped), chance.uniform(MIN_S, MAX_S)) for _ in range(kills))
     ends = [run(command(folder)) for folder in (stopped, whole)]

@@ -1,4 +1,4 @@
-"""Reads a recording with software that others wrote: the `mcap` package's validating reader, Foxglove's protobuf
+"""Reads a recording with independent software: the `mcap` package's validating reader, Foxglove's protobuf
 descriptors as the file carries them, and `jsonschema`.
 
     pip install -r tests/peers/clients/mcap_check.txt
@@ -27,7 +27,7 @@ CONTROL_STEP_NS = 20_000_000
 
 
 class Broken(Exception):
-    """The recording is not what it should be."""
+    """The recording is wrong."""
 
 
 def expect(condition, reason):
@@ -36,7 +36,7 @@ def expect(condition, reason):
 
 
 def decode(schema, channel, message, factory, validators):
-    """The message as protobuf object or dict; raises where it does not fit its schema."""
+    """Returns the message as protobuf object or dict. Raises an exception if it does not fit its schema."""
     if channel.message_encoding == "json":
         if schema.id not in validators:
             document = json.loads(schema.data)
@@ -54,7 +54,7 @@ def decode(schema, channel, message, factory, validators):
 
 
 def check_transforms(update, topic, time_ns):
-    """Every frame has one parent, and unit quaternions."""
+    """Checks that every frame has one parent, and unit quaternions."""
     children = [transform.child_frame_id for transform in update.transforms]
     expect(len(children) == len(set(children)), f"{topic}: a frame has two parents at {time_ns} ns")
     known = set(children) | {"world"}
@@ -67,7 +67,7 @@ def check_transforms(update, topic, time_ns):
 
 
 def messages(reader, path):
-    """Every message; only a recording that was interrupted may end without a footer."""
+    """Yields every message. Only an interrupted recording may end without a footer."""
     try:
         yield from reader.iter_messages(log_time_order=False)
     except EndOfFile:

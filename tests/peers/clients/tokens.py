@@ -85,7 +85,7 @@ def hand(robot, position_m, fingers=None):
 
 
 def look_around(counter, robot):
-    """What a model does to find something: a picture, a coarse grid, a fine one, and whether it can be reached."""
+    """Calls of a model that looks for an object: an image, a coarse grid, a fine one, and a check of its reach."""
     counter.call("observe", robots=[robot])
     counter.call("query_depth", robot=robot, region={"from": [40, 100], "to": [280, 220], "stride": 20})
     counter.call("query_depth", robot=robot, region={"from": [140, 150], "to": [200, 210], "stride": 6})

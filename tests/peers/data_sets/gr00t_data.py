@@ -1,4 +1,4 @@
-"""Isaac-GR00T's own classes read what `tandem export lerobot --format v2` writes, as it is.
+"""Isaac-GR00T's own classes read the unchanged output of `tandem export lerobot --format v2`.
 
     pip install -r tests/peers/data_sets/gr00t_data.txt        (Python 3.12)
     pip install "./gateway/python[lerobot]"
@@ -89,7 +89,7 @@ def read_newer(folder, keys, horizons, episode):
 
 
 def compare(name, folder, episode, keys, horizons, recording, robots, instruction):
-    """A row that GR00T reads, and its statistics, against the recordings.
+    """Compares a row that GR00T reads, and its statistics, with the recordings.
 
     robots: index of the robot in the recording, by the beginning of its parts' names.
     """

@@ -1,4 +1,4 @@
-"""LeRobot's own classes and trainer read what `tandem export lerobot` writes; so do `datasets` and PyArrow without LeRobot.
+"""LeRobot's own classes and trainer read the output of `tandem export lerobot`; so do `datasets` and PyArrow without LeRobot.
 
     pip install -r tests/peers/data_sets/lerobot_data.txt        (Python 3.12)
     pip install "./gateway/python[lerobot]"
@@ -57,7 +57,7 @@ def opened(folder):
 
 
 def compare(name, folder, recordings, stride, robot=None):
-    """Rows that LeRobot reads against the recordings."""
+    """Compares the rows that LeRobot reads with the recordings."""
     data_set = opened(folder)
     worst_db, worst_mm = np.inf, 0.0
     for row in np.linspace(0, len(data_set) - 1, SAMPLES).astype(int):
@@ -89,7 +89,7 @@ def compare(name, folder, recordings, stride, robot=None):
 
 
 def compare_statistics(data_set):
-    """LeRobot's statistics of the state of an episode against ours, whose quantiles are exact."""
+    """Compares LeRobot's statistics of an episode's state with ours, whose quantiles are exact."""
     rows = data_set.hf_dataset.with_format("numpy")
     first = np.stack([rows[index]["observation.state"] for index in range(data_set.meta.episodes[0]["length"])])
     theirs = compute_episode_stats({"observation.state": first}, data_set.meta.features)["observation.state"]
@@ -105,7 +105,7 @@ def compare_statistics(data_set):
 
 
 def play(data_set, recordings, rate_hz):
-    """The actions of the data set, played as a policy map plays rows, reach what the recording reached, when it did."""
+    """Checks that the data set's actions, played like rows of a policy map, reach the recorded phases at the same times."""
     rows = data_set.hf_dataset.with_format("numpy")
     actions = np.stack([rows[index]["action"] for index in range(data_set.meta.episodes[0]["length"])])
     recording, steps = recordings[0], 50 // rate_hz
@@ -145,7 +145,7 @@ def train(folder, out):
 
 
 def evaluate(folder, settings, policy, out):
-    """The policy in the environment with the rows of its data set; at another rate, it is refused."""
+    """Plays the policy in the environment with the rows of its data set. At another rate, it is refused."""
     command = [
         PROGRAMS / "lerobot-eval",
         "--env.discover_packages_path=lerobot_env_tandem",

@@ -1,4 +1,4 @@
-"""openpi's own loader and transforms read what `tandem export lerobot --format v2` writes, by `gateway/examples/training`.
+"""openpi's own loader and transforms read the output of `tandem export lerobot --format v2`, with `gateway/examples/training`.
 
     pip install -r tests/peers/data_sets/openpi_data.txt        (Python 3.11)
     pip install --no-deps lerobot==0.3.3
@@ -57,7 +57,7 @@ def chosen(rows, base):
 
 
 def compare(dataset, data, episode, recording, robot, length_before):
-    """A row as openpi's model gets it, before normalisation, against the recording."""
+    """Compares a row of the input of openpi's model, before normalisation, with the recording."""
     item = dataset[length_before + ROW]
     step = ROW * STRIDE
     state = chosen(recording.states[step, robot], 43)

@@ -48,7 +48,7 @@ rate_hz = 50.0
 
 
 def save_fresh_policy(folder):
-    """An ACT as LeRobot saves it, whose actions are near to arms at rest."""
+    """An ACT in the form that LeRobot saves. Its actions are close to arms at rest."""
     torch.manual_seed(0)
     config = ACTConfig(
         input_features={
@@ -74,7 +74,7 @@ def save_fresh_policy(folder):
 
 
 def serve(folder, asked):
-    """The example's server, whose questions and answers are kept."""
+    """The example's server. Its requests and answers are stored."""
     spec = importlib.util.spec_from_file_location("lerobot_act_server", SERVER)
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)

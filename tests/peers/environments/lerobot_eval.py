@@ -62,7 +62,7 @@ def by_command():
 
 
 def by_hub():
-    """The file that a repository of the hub holds, loaded and asked as LeRobot does it."""
+    """The file of a repository of the hub, loaded and called like in LeRobot."""
     config = TandemEnvConfig(task="Handover-v0", **SIZE)
     module = _load_module_from_path(str(REPOSITORY / "gateway/examples/environments/env.py"))
     suites = _normalize_hub_result(_call_make_env(module, n_envs=WORLDS, use_async_envs=False, cfg=config))

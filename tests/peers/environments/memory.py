@@ -1,4 +1,4 @@
-"""What episodes leave in memory: plays short ones of all tasks in turn, and says how much the process has grown.
+"""Memory left by episodes: plays short ones of all tasks in turn, and prints the growth of the process.
 
     pip install ./gateway/python
     python tests/peers/environments/memory.py [--episodes 1000] [--most-growth 0.02]
@@ -27,7 +27,7 @@ TASKS = 10
 
 
 def held_bytes():
-    """What the process holds of the machine's memory, without pages of files."""
+    """Returns the memory that the process uses, without pages of files."""
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)
     resident, shared = map(int, Path("/proc/self/statm").read_text().split()[1:3])
@@ -58,7 +58,7 @@ def recorded(task, seed, folder):
 
 
 def raising(task, seed, folder):
-    """A policy that raises, in an episode that nobody closes."""
+    """A policy that raises an exception, in an episode that is never closed."""
     episode = tandem.Episode(task, seed)
     try:
         episode.start()

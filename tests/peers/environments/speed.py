@@ -1,4 +1,4 @@
-"""Steps of environments per second, beside MuJoCo's own binding, its `rollout` and EnvPool, all in the same minutes.
+"""Steps of environments per second, compared with MuJoCo's own binding, its `rollout` and EnvPool, all in the same minutes.
 
     pip install -r tests/peers/environments/speed.txt
     pip install ./gateway/python

@@ -34,7 +34,7 @@ LIFTED_S = 5.0
 
 
 def run(told, *flags):
-    """What the command's log says of the one episode."""
+    """The entry of the one episode in the command's log."""
     with tempfile.TemporaryDirectory() as logs:
         looks = ["-E", f"task={TASK}", "-E", f"look_every={CHUNK}", "-E", "renderer=cpu"]
         task = ["--task", "tandem", "-T", f"task={TASK}", "-T", f"seeds={SEED}"]
@@ -67,7 +67,7 @@ def scripted(told):
 
 
 class Model(BaseHTTPRequestHandler):
-    """A model that answers as Chat Completions do; `names` and `told` are set below."""
+    """A model that answers like Chat Completions; `names` and `told` are set below."""
 
     protocol_version = "HTTP/1.1"
     asked = []

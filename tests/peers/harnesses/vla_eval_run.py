@@ -31,7 +31,7 @@ EPISODES = 2
 
 
 class Scripted(PredictModelServer):
-    """Tells rows in their order, and the last one from then on."""
+    """Sends rows in their order, and then the last one repeatedly."""
 
     def __init__(self, told):
         super().__init__(chunk_size=CHUNK)

@@ -1,4 +1,4 @@
-"""Quadratic programs as Clarabel solves them, an interior point method, for `cargo test -p tandem-ik --release qp`.
+"""Solutions of quadratic programs by Clarabel, an interior point method, for `cargo test -p tandem-ik --release qp`.
 
     python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/numerics/qp.txt
     /tmp/peers/bin/python tests/peers/numerics/qp.py

@@ -1,4 +1,4 @@
-"""The figures of reports as scipy and statsmodels compute them.
+"""Figures of reports, computed by scipy and statsmodels.
 
     pip install -r tests/peers/numerics/statistics.txt
     python tests/peers/numerics/statistics.py                        # writes episodes/evaluation/src/statistics/peers.json, which a test holds us to
@@ -41,7 +41,7 @@ def mean(counts):
 
 
 def newcombe(both, first, second, neither):
-    """Newcombe 1998, method 10, of the second rate less the first."""
+    """Newcombe 1998, method 10, for the second rate minus the first."""
     n = both + first + second + neither
     p1, p2 = (both + first) / n, (both + second) / n
     (l1, u1), (l2, u2) = (proportion_confint(both + one, n, method="wilson") for one in (first, second))

@@ -1,6 +1,6 @@
-// `tandem collect --operators 2` in a headless Chromium: whoever runs it opens the page with all links, two people follow theirs, play
-// two episodes, mark one bad, and run the command again; and pictures of all pages for somebody to look at. How it is run is said in
-// shared/browser.mjs.
+// `tandem collect --operators 2` in a headless Chromium. The host opens the page with all links. Two people open their links, play
+// two episodes and mark one bad, and the command runs again. The script also takes pictures of all pages for inspection.
+// shared/browser.mjs describes how to run it.
 import assert from "node:assert/strict";
 import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -8,14 +8,14 @@ import { PATIENCE_MS, done, folder, open, pictures, run } from "./shared/browser
 
 const out = join(folder("collect"), "people");
 
-/** Runs the command; answers with its links, and with what tells that it has ended. */
+/** Runs the command. Returns its links, and a promise of its end. */
 async function collect(seeds) {
   const flags = ["--operators", "2", "--tasks", "handover", "--protocol", "benchmark", "--renderer", "cpu", "--seeds", seeds, "--out", out];
   const { said, ended } = await run(["collect", ...flags], /watch at/);
   return { links: [...said.matchAll(/^(?:robot \w|all links): (\S+)$/gm)].map(([, link]) => link), ended };
 }
 
-/** Both begin, drive for a moment, finish, and mark the episode. */
+/** Lets both begin, drive for a moment, finish, and mark the episode. */
 async function play(people, marks, looked) {
   for (const page of people) await page.getByRole("button", { name: "Begin" }).click();
   for (const page of people) await page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });

@@ -1,5 +1,5 @@
-// What three people who watch cost an episode: the same calls with and without them, in turns, come to the same state, and take as long. No
-// browser is needed; those who watch only listen. The machine has to be quiet.
+// Cost of three watchers for an episode: the same calls with and without them, alternately, reach the same state and take as long. No
+// browser is needed, because the watchers only listen. The machine has to be idle.
 //
 //     node REPOSITORY/tests/peers/pages/cost.mjs REPOSITORY/target/release/tandem
 import assert from "node:assert/strict";
@@ -15,7 +15,7 @@ const WATCHERS = 3;
 const { link, base } = await serve();
 const key = new URL(link).hash.slice(1);
 
-/** Plays an episode. Returns control steps a second, and the state it comes to. */
+/** Plays an episode. Returns control steps a second, and the final state. */
 async function play(watchers) {
   const { episode_id: id } = await post(base, "/v1/episodes", { task: "handover", seed: 2000 });
   const watching = new Worker(new URL("./shared/watchers.mjs", import.meta.url), { workerData: { base, episode: id, key, count: watchers } });
@@ -38,7 +38,7 @@ await play(0);
 const shares = [];
 const hashes = new Set();
 for (let pair = 0; pair < PAIRS; pair += 1) {
-  // Who comes first changes, so that what changes with time does so for both.
+  // The order alternates, so that changes over time affect both.
   const order = pair % 2 ? [WATCHERS, 0] : [0, WATCHERS];
   const rates = {};
   for (const watchers of order) {

@@ -1,5 +1,5 @@
-// 20 people watch and three drive BigTable for ten minutes, one episode after another, and all who watched look at each again once it is
-// over, and at all of them ten times at the end: the server's memory stays as it is, and no command is dropped. No browser is needed.
+// 20 people watch and three drive BigTable for ten minutes, one episode after another. All watchers open each episode again once it is
+// over, and all of them ten times at the end. The server's memory does not grow, and no command is dropped. No browser is needed.
 //
 //     node REPOSITORY/tests/peers/pages/crowd.mjs REPOSITORY/target/release/tandem [MINUTES]
 import assert from "node:assert/strict";
@@ -9,9 +9,9 @@ import { driver, watcher } from "./shared/socket.mjs";
 
 const minutes = Number(process.argv[3] ?? 10);
 const WATCHERS = 20;
-/** How often all episodes are looked at again at the end. */
+/** Number of times that all episodes are opened again at the end. */
 const ROUNDS = 10;
-/** An episode is no shorter: what it takes at its beginning is not what it takes. */
+/** Minimum duration of an episode, because its beginning is not typical of its memory. */
 const LEAST_MS = 20_000;
 const { link, base, server } = await serve();
 const key = new URL(link).hash.slice(1);
@@ -61,7 +61,7 @@ for (let seed = 2000; 60_000 * minutes - (performance.now() - began) > LEAST_MS;
   await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" });
   const [recording] = await Promise.all(Array.from({ length: WATCHERS }, () => look(id)));
   memory.push(megabytes());
-  // Every step that was made has a command of each robot in the recording.
+  // The recording has a command of each robot for every step.
   const { story } = JSON.parse(new TextDecoder().decode(recording.slice(4, 4 + new DataView(recording).getUint32(0, true))));
   for (const { tool, ok, arguments: asked, reply } of story.filter((entry) => entry.tool === "together")) {
     assert.ok(ok, reply);

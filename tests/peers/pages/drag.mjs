@@ -1,6 +1,6 @@
-// How long it takes on the page at /operate from a drag to a wrist that moves, in real time with two robots: in the row that has it, in the
-// picture of it, and in the handle itself; on this machine, and over a link on which everything takes 100 ms each way. How it is run is said
-// in shared/browser.mjs; the machine has to be quiet.
+// Time on the page at /operate from a drag to a moving wrist, in real time with two robots: to the row with the motion, to its
+// picture, and to the motion of the handle. It is measured on this machine, and over a connection with a delay of 100 ms each way.
+// shared/browser.mjs describes how to run it. The machine has to be idle.
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { connect, createServer } from "node:net";
@@ -8,9 +8,9 @@ import { PATIENCE_MS, countDrawn, done, drawnRate, median, open, post, serve } f
 import { hear, places } from "./shared/rows.mjs";
 import { driver } from "./shared/socket.mjs";
 
-/** From a drag to a picture of the wrist moved. */
+/** Maximum time from a drag to a picture of the moved wrist. */
 const MOST_LATENCY_MS = 120;
-/** How long everything takes each way over the slow link. */
+/** Delay of the slow connection each way. */
 const SLOW_LINK_MS = 100;
 
 const { base } = await serve();
@@ -27,10 +27,10 @@ function watchPointer() {
 const person = (origin = base, link = linkTo(a)) => open(origin + link, { before: [hear, watchPointer, countDrawn] });
 const running = (page) => page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });
 
-/** Returns the medians of the times from drags of a person's right handle to the row that has the wrist moved, to a picture of it, and to the handle. */
+/** Returns the medians of the times from drags of a person's right handle to the row with the moved wrist, to its picture, and to the handle. */
 async function latencies(page, drags) {
   const found = [];
-  // From there the wrist is in sight, wherever it is.
+  // From this camera the wrist is always visible.
   await page.getByLabel("View").selectOption("free");
   await page.waitForTimeout(500);
   const at = places(await page.evaluate(() => window.head), await page.evaluate(() => window.head.robot));
@@ -58,7 +58,7 @@ async function latencies(page, drags) {
         look();
       });
     }, at);
-    // To and fro, so that the wrist stays where it can go.
+    // The drags go forth and back, so that the wrist stays within reach.
     await page.mouse.move(u + (drag % 2 ? 30 : -30), v);
     found.push(await page.evaluate(() => window.measured));
     await page.mouse.up();
@@ -69,7 +69,7 @@ async function latencies(page, drags) {
 }
 const told = (where, { rowMs, drawnMs, handleMs }) => console.log(`${where}: from a drag to the row with the wrist moved ${rowMs.toFixed(0)} ms, to its picture ${drawnMs.toFixed(0)} ms, to the handle ${handleMs.toFixed(0)} ms (medians)`);
 
-// B's person is at another machine, whose browser does not draw on this one.
+// B's person is at another machine, so its browser does not use this processor.
 const other = await driver(base, "B", b.token);
 const pageA = await person();
 await running(pageA);
@@ -79,7 +79,7 @@ const quick = await latencies(pageA, 15);
 told("on this machine", quick);
 console.log(`the world ran at ${((await time(pageA) - simulated) / ((performance.now() - clock) / 1000)).toFixed(2)} of real time; A's page drew ${(await drawnRate(pageA)).toFixed(0)} frames a second`);
 
-// B's person at the same machine, in the same browser: one processor draws both pages.
+// B's person is at the same machine, in the same browser: one processor draws both pages.
 other.leave();
 const pageB = await person(base, linkTo(b));
 await Promise.all([running(pageA), running(pageB)]);
@@ -89,7 +89,7 @@ console.log(`A's page drew ${(await drawnRate(pageA)).toFixed(0)} frames a secon
 await pageB.context().close();
 const again = await driver(base, "B", b.token);
 
-// A link on which everything takes 100 ms each way: the handle is where the person has it at once, and the wrist follows.
+// Over a connection with a delay of 100 ms each way, the handle follows the pointer immediately, and the wrist later.
 const slow = createServer((near) => {
   const far = connect(Number(new URL(base).port), "127.0.0.1");
   const pass = (from, to) => from.on("data", (data) => setTimeout(() => to.writable && to.write(data), SLOW_LINK_MS)).on("close", () => setTimeout(() => to.end(), SLOW_LINK_MS)).on("error", () => to.destroy());
@@ -105,7 +105,7 @@ await running(slowA);
 const late = await latencies(slowA, 7);
 told(`over ${SLOW_LINK_MS} ms each way`, late);
 
-// A drag of a second: at its end the handle is where the pointer is, and the wrist arrives.
+// After a drag of a second the handle is at the pointer, and the wrist arrives.
 const handle = slowA.getByRole("button", { name: "right wrist: drag" });
 const before = await handle.boundingBox();
 const [u, v] = [before.x + before.width / 2, before.y + before.height / 2];

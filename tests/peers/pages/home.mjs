@@ -1,6 +1,6 @@
 // The start page in a headless Chromium: an episode is started and played by the lines to copy, the watch link
 // is entered, finished episodes are filtered, two are played side by side, and a server with a token asks for
-// it. How it is run is said in shared/browser.mjs.
+// it. shared/browser.mjs describes how to run it.
 import assert from "node:assert/strict";
 import { spawn, spawnSync } from "node:child_process";
 import { join } from "node:path";
@@ -14,7 +14,7 @@ const played = async (...words) => {
   ).ended;
 };
 
-// Whoever comes without the watch link sees tasks and lines, and starts an episode.
+// A visitor without the watch link sees tasks and lines, and starts an episode.
 const page = await open(base);
 const task = (id) => page.locator(".task", { has: page.getByRole("heading", { name: id, exact: true }) });
 await task("handover").waitFor();
@@ -28,13 +28,13 @@ await page.getByRole("button", { name: "Start handover" }).click();
 await page.getByText("handover-seed7 waits for its first command.").waitFor();
 await page.locator("#running .card", { hasText: "handover-seed7" }).waitFor();
 
-// The lines do what they say.
+// The lines work.
 const lines = await page.getByLabel("Lines for REST").innerText();
 const { status, stdout } = spawnSync("sh", ["-ec", lines], { encoding: "utf8" });
 assert.ok(status === 0 && stdout.includes('"executed_steps"'), `${lines}\n${stdout}`);
 await page.locator("#running .card", { hasText: "step 325" }).waitFor();
 
-// By the watch link the page becomes whole.
+// With the watch link the page shows all sections.
 await page.getByLabel(/watch link/).fill("not the link");
 await page.getByRole("button", { name: "Open" }).click();
 await page.getByText("That is not this server's link").waitFor();
@@ -103,14 +103,14 @@ await pictures(page, "beside", { settleMs: 1500 });
 await page.locator(".play").click();
 await page.getByText(/^12\.[1-9]/).waitFor();
 
-// A moment's address opens at it.
+// The address of a moment opens the page at that moment.
 await page.goto(`${base}/watch?run=handover-seed2001`);
 await page.locator(".track input").fill("3.5");
 await page.waitForURL(/at=3\.50/);
 await page.reload();
 await page.getByText(/^3\.50 of/).waitFor();
 
-// A server with a token asks for it, and its lines name the variable that has it.
+// A server with a token asks for it, and its lines name the variable that contains it.
 const guarded = spawn(program, ["serve", "--listen", "127.0.0.1:0", "--runs", runs], {
   env: { ...process.env, TANDEM_TOKEN: TOKEN },
   stdio: ["ignore", "pipe", "ignore"],

@@ -1,5 +1,5 @@
-// Three operators lift BigTable: each says 50 times a second over the socket of the pages what its robot is to do. They know how from the
-// experts, whom the server has for each robot: an episode of theirs comes first. No browser is needed.
+// Three operators lift BigTable. Each sends setpoints for its robot 50 times a second over the socket of the pages. The setpoints come from
+// the experts, who play an episode first. No browser is needed.
 //
 //     node REPOSITORY/tests/peers/pages/lift.mjs REPOSITORY/target/release/tandem
 import assert from "node:assert/strict";
@@ -9,7 +9,7 @@ import { deadline, post, program, serve } from "./shared/server.mjs";
 import { driver } from "./shared/socket.mjs";
 
 const CONTROL_HZ = 50;
-/** Longer than the experts take to lift. */
+/** Maximum time of the lift, which is longer than the experts take. */
 const MOST_S = 60;
 deadline(5);
 
@@ -20,7 +20,7 @@ const stands = async (id) => (await fetch(`${base}/v1/episodes/${id}`)).json();
 const remove = async (id) => (await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" })).json();
 const passed = (ms) => new Promise((done) => setTimeout(done, ms));
 
-// The experts play it, each its own robot, until the table is lifted.
+// The experts play, each for its own robot, until the table is lifted.
 const theirs = await begin();
 for (const { robot } of theirs.operators) await post(base, "/operate/expert", { episode: theirs.episode_id, robot });
 while (!(await stands(theirs.episode_id)).phases?.length) await passed(200);
@@ -29,7 +29,7 @@ console.log(`the experts lift it after ${shown.phases.p1} s`);
 const recorded = await (await fetch(`${base}/watch/run?run=${theirs.episode_id}`, { headers: key })).arrayBuffer();
 const { story } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
 
-/** What a robot was told from when until when, by its expert. */
+/** Commands of a robot by its expert, with their start and end times. */
 function toldOf(robot) {
   return story.filter(({ tool, ok }) => tool === "together" && ok).flatMap(({ arguments: given, reply, time_s: until }) => {
     const own = JSON.parse(given).commands.find((command) => command.robot === robot);
@@ -41,7 +41,7 @@ function toldOf(robot) {
   });
 }
 
-/** What is to be said at a moment: wrists go on their lines from where they were told to be last. */
+/** Returns the setpoints at a moment. Wrists move on their lines from their last targets. */
 function wordAt(told, time_s) {
   const index = told.findLastIndex(({ from }) => from <= time_s + 1e-6);
   if (index < 0) return {};

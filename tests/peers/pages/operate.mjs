@@ -1,5 +1,5 @@
-// The page at /operate in a headless Chromium: two people start an episode, drive by handles, keys, a gamepad and the fingers of a hand that
-// holds a telephone, talk, go away and come back, take hold of the bottle and lift it. How it is run is said in shared/browser.mjs.
+// The page at /operate in a headless Chromium: two people start an episode, drive by handles, keys, a gamepad and fingers on a
+// telephone, talk, leave and return, grasp the bottle and lift it. shared/browser.mjs describes how to run it.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
@@ -8,13 +8,13 @@ import { hear, inPages, poses } from "./shared/rows.mjs";
 
 const { base, runs } = await serve();
 
-/** A gamepad of ours. */
+/** A simulated gamepad. */
 function pad() {
   window.pad = null;
   navigator.getGamepads = () => (window.pad ? [/** @type {Gamepad} */ (window.pad)] : []);
 }
 
-/** A person: a browser's context of their own. */
+/** A person with a separate browser context. */
 const person = (path, device) => open(new URL(path, base).href, { before: [hear, pad, inPages], ...device });
 const TELEPHONE = { viewport: { width: 400, height: 800 }, deviceScaleFactor: 2, hasTouch: true, isMobile: true };
 
@@ -35,7 +35,7 @@ let pageB = await person(b);
 await Promise.all([running(pageA), running(pageB)]);
 assert.ok(!pageA.url().includes("token"), "the token is still in the address");
 
-// Hands that hang are below the robot's picture, and their handles in sight; what is asked is told phase by phase.
+// Hanging hands are below the robot's picture, and their handles are visible. The phases are listed.
 const insideBy = (page, side) => page.locator(`.handle.${side}`).evaluate((handle) => {
   const [own, place] = [handle, document.querySelector(".operate-view")].map((one) => one.getBoundingClientRect());
   return Math.min(own.left - place.left, place.right - own.right, own.top - place.top, place.bottom - own.bottom);
@@ -46,17 +46,17 @@ assert.deepEqual(await pageA.locator(".phases li > :last-child").allInnerTexts()
 const withPad = (page, axes, buttons) => page.evaluate(([some, values]) => {
   window.pad = { connected: true, axes: some, buttons: values.map((value) => ({ value, pressed: value > 0.5 })) };
 }, [axes, Array.from({ length: 17 }, (_, index) => buttons[index] ?? 0)]);
-// A takes the bottle: by keys to beside it, level and open, by the gamepad's trigger closed, by keys up, while B waits.
+// A takes the bottle while B waits: keys move the level, open hand beside it, the gamepad's trigger closes the hand, and keys lift it.
 await pageA.keyboard.press("2");
 for (const key of [" ", "h", "o"]) await pageA.keyboard.press(key);
-/** Waits until so much time has passed in the world, which is slow where the machine is. */
+/** Waits until this simulated time has passed, which takes longer on a slow machine. */
 const worldPasses = async (seconds) => {
   const { time_s: from } = await poses(pageA);
   await pageA.waitForFunction((until) => window.rows.at(-1).row[2] >= until, from + seconds);
 };
 /**
- * Brings the right wrist to a place beside the bottle, along the axes of the pelvis frame: keys are held for as long as most of the way
- * takes, and again once the wrist has come to where it was sent.
+ * Brings the right wrist to a place beside the bottle, along the axes of the pelvis frame: keys are held for the time that most of
+ * the way takes, and again once the wrist has reached its target.
  */
 const reach = (offset) => pageA.evaluate(async ([goal, patienceMs]) => {
   const KEYS = [["ArrowUp", "ArrowDown"], ["ArrowLeft", "ArrowRight"], ["PageUp", "PageDown"]];
@@ -134,7 +134,7 @@ await pageA.getByRole("button", { name: "Say" }).click();
 await pageB.getByText("Here it comes <b>now</b>.").waitFor();
 await accessible(pageA, "who drives");
 
-// B goes away: time stands still. B comes back: it goes on.
+// While B is away, time is paused. It continues when B returns.
 await pageB.context().close();
 await pageA.getByRole("status").filter({ hasText: "waits for robot B" }).waitFor();
 const stood = (await stateOf(a, "A")).time_s;
@@ -143,7 +143,7 @@ assert.equal((await stateOf(a, "A")).time_s, stood);
 pageB = await person(b);
 await Promise.all([running(pageA), running(pageB)]);
 
-// Real time, as nearly as this machine draws.
+// The episode runs in real time, as far as this machine can draw it.
 const timeNow = async () => (await stateOf(a, "A")).time_s;
 const [clock, simulated] = [performance.now(), await timeNow()];
 await worldPasses(2);
@@ -151,7 +151,7 @@ const rate = (await timeNow() - simulated) / ((performance.now() - clock) / 1000
 console.log(`the world runs at ${rate.toFixed(2)} of real time`);
 assert.ok(rate <= 1.1, `${rate}`);
 
-// A gamepad: a stick walks, a trigger closes, a bumper lets go.
+// On the gamepad a stick walks, a trigger closes the hand, and a bumper releases the arms.
 const resting = await stateOf(b, "B");
 await withPad(pageB, [0, -1, 0, 0], { 7: 1 });
 await until("by a gamepad B walked [m]", () => walkedM(resting), 0.1);
@@ -165,7 +165,7 @@ await pageA.waitForTimeout(300);
 await withPad(pageA, [0, 0, 0, 0], {});
 assert.ok(await targetOf(pageA));
 
-// B drives on by a telephone: one thumb walks, then turns, while a finger drags a hand; the page stays where it is.
+// B continues on a telephone: one thumb walks, then turns, while a finger drags a hand. The page does not scroll.
 await pageB.context().close();
 pageB = await person(b, TELEPHONE);
 await Promise.all([running(pageA), running(pageB)]);
@@ -200,8 +200,8 @@ await fingersAre("touchEnd");
 assert.deepEqual(await pageB.evaluate(() => [scrollX, scrollY, visualViewport.scale]), [0, 0, 1], "a finger moved the page");
 assert.equal(await pageB.locator(".pad .knob").first().evaluate((knob) => knob.style.transform), "translate(0%, 0%)");
 
-// Step by step: time passes only when it is asked for.
-/** When it is once time stands still. */
+// In the stepwise mode time passes only on request.
+/** Returns the simulated time once it is paused. */
 const stands = async () => {
   for (let [before, now] = [null, await timeNow()]; ; [before, now] = [now, await timeNow()]) {
     if (now === before) return now;
@@ -218,12 +218,12 @@ await pageA.getByLabel("step by step").uncheck();
 
 await pageA.screenshot({ path: "drive-free.png" });
 
-// A forged link drives nothing.
+// A forged link cannot drive a robot.
 const forged = await person(a.replace(/token=[^&]*/, "token=0123456789abcdef0123456789abcdef01234567"));
 await forged.getByRole("heading", { name: "Nothing to drive" }).waitFor();
 assert.equal(await forged.getByRole("status").count(), 0, "a forged link drives");
 
-// It ends, and both pages say what came of it and where it is found.
+// The episode ends, and both pages show its outcome and its address.
 await fetch(`${base}/v1/episodes/${episode}`, { method: "DELETE" });
 for (const page of [pageA, pageB]) {
   await page.getByText("The episode has ended").waitFor();
@@ -232,7 +232,7 @@ for (const page of [pageA, pageB]) {
 }
 assert.match(await pageA.locator(".phases").innerText(), /p1 grasp and lift[^]*\d s[^]*p2 transfer[^]*not reached/);
 await accessible(pageA, "an episode that is over");
-// What a window of another size shows of it is drawn anew.
+// After a change of the window's size the scene is drawn again.
 await pageA.setViewportSize({ width: 900, height: 700 });
 await until("bytes of the end's picture", async () => (await pageA.locator(".view canvas").screenshot()).length, 20_000);
 const recording = join(runs, episode, "episode.mcap");

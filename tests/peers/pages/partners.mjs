@@ -1,5 +1,5 @@
 // From the start page at /operate, a person drives robot B beside an expert who drives A, and then beside a learned policy, which is
-// behind `/act`: one of yours, or one made up here that raises A's right arm. How it is run is said in shared/browser.mjs.
+// served at `/act`: your own, or a test policy that raises A's right arm. shared/browser.mjs describes how to run it.
 //
 //     node REPOSITORY/tests/peers/pages/partners.mjs REPOSITORY/target/release/tandem [ACT_URL MAP]
 import { execFileSync } from "node:child_process";
@@ -9,7 +9,7 @@ import { join } from "node:path";
 import { PATIENCE_MS, done, open, pictures, program, serve } from "./shared/browser.mjs";
 import { hear, inPages, poses } from "./shared/rows.mjs";
 
-/** Answers with the joints as they are, but for a right arm that is raised from row to row. */
+/** Returns rows with the present joints, except for a right arm that is raised from row to row. */
 async function madeUp() {
   const server = createServer((request, answer) => {
     let body = "";
@@ -17,7 +17,7 @@ async function madeUp() {
     request.on("end", () => {
       const { __numpy__: bytes } = JSON.parse(body)["observation/state"];
       const joints = new Float32Array(Uint8Array.from(Buffer.from(bytes, "base64")).buffer);
-      // Asked: legs, waist, left arm and hand, right arm and hand. Told: arms, hands, waist, base.
+      // Order of the request: legs, waist, left arm and hand, right arm and hand. Order of the answer: arms, hands, waist, base.
       const [waist, leftArm, leftHand, rightArm, rightHand] = [[12, 15], [15, 22], [22, 29], [29, 36], [36, 43]].map((range) => [...joints.slice(...range)]);
       const held = [...leftArm, ...rightArm, ...leftHand, ...rightHand, ...waist, 0, 0, 0, 0.76];
       const rows = Array.from({ length: 10 }, (_, row) => held.map((value, column) => (column === 7 ? value - 0.01 * (row + 1) : value)));
@@ -35,7 +35,7 @@ const given = process.argv.slice(3);
 const [url, map] = given.length === 2 ? given : await madeUp();
 const { base, runs } = await serve("--partner", `act:${url}`, "--partner-map", map);
 
-/** Starts Handover with `player` for A, and drives B: answers with B's page. */
+/** Starts Handover with `player` for A, and drives B. Returns B's page. */
 async function beside(player, seed) {
   const starter = await open(`${base}/operate`);
   await starter.locator("option[value=handover]").waitFor({ state: "attached" });
@@ -53,7 +53,7 @@ async function beside(player, seed) {
   return { page, episode };
 }
 
-/** Ends an episode, whose recording has to come to the same again; answers with its result. */
+/** Ends an episode, checks that the replay of its recording is identical, and returns its result. */
 async function end({ page, episode }) {
   await page.context().close();
   const result = await (await fetch(`${base}/v1/episodes/${episode}`, { method: "DELETE" })).json();

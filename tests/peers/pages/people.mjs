@@ -1,5 +1,5 @@
-// `tandem collect --operators 2` with two people whose browsers are not needed: they play ten episodes over the pages' socket, with HTTPS
-// where certificate and key are given, and mark them good; the folder is as the experts' are.
+// `tandem collect --operators 2` with two people without browsers. They play ten episodes over the pages' socket, with HTTPS
+// if certificate and key are given, and mark them good. The folder has the same form as the experts' folders.
 //
 //     node REPOSITORY/tests/peers/pages/people.mjs REPOSITORY/target/release/tandem OUT [CERTIFICATE KEY]
 import assert from "node:assert/strict";
@@ -10,7 +10,7 @@ import { driver } from "./shared/socket.mjs";
 
 const [, , , out, certificate, key] = process.argv;
 const EPISODES = 10;
-// The certificate is one that nobody vouches for.
+// The certificate is self-signed.
 if (certificate) process.env.NODE_TLS_REJECT_UNAUTHORIZED = "0";
 const secured = certificate ? ["--tls-cert", certificate, "--tls-key", key] : [];
 const flags = ["--operators", "2", "--tasks", "handover", "--protocol", "benchmark", "--renderer", "cpu", "--seeds", `0-${EPISODES - 1}`, "--out", out];
@@ -20,7 +20,7 @@ assert.ok(links.every(({ protocol }) => protocol === (certificate ? "https:" : "
 const [{ origin: base }] = links;
 const passed = (ms) => new Promise((done) => setTimeout(done, ms));
 
-/** One of the people, until all episodes are there. */
+/** Acts as one of the people until all episodes are complete. */
 async function play(seat) {
   const { robot, token } = Object.fromEntries(new URLSearchParams(seat.hash.slice(1)));
   const headers = { authorization: `Bearer ${token}`, "content-type": "application/json" };

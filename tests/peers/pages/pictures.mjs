@@ -1,17 +1,17 @@
-// Pictures of every page, at 400, 1400 and 2500 pixels, light and dark, for somebody to look at: where a server begins, an episode while it is
-// played, driven and finished, an evaluation and its report. No page may be wider than its window, and axe may find nothing serious. How it
-// is run is said in shared/browser.mjs; what pages do is tried by the scripts beside this one.
+// Pictures of every page, at 400, 1400 and 2500 pixels, light and dark, for inspection: the start page, an episode that is
+// played, driven and finished, an evaluation and its report. No page may be wider than its window, and axe may find no serious problem.
+// shared/browser.mjs describes how to run it. The other scripts test the functions of the pages.
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { PATIENCE_MS, browser, done, open, pictures, post, run, serve } from "./shared/browser.mjs";
 
-/** Where a page draws a scene that a processor draws: no more of it than is needed, and the time that it takes. */
+/** Settings for pages with a scene drawn in software: a minimal size, and the time that it takes. */
 const SCENE = { heights: { 400: 700, 1400: 1000, 2500: 1400 }, settleMs: 1500 };
 
 const { link, base, runs } = await serve();
 const played = async (...words) => { await (await run(words, /./)).ended; };
 
-// Where nothing has happened yet.
+// The server has no episodes yet.
 const page = await open(base);
 await pictures(page, "home-empty");
 const stranger = await (await browser.newContext()).newPage();
@@ -22,7 +22,7 @@ await page.goto(link);
 await page.getByText("None runs.").waitFor();
 await pictures(page, "cards-empty");
 
-// An evaluation, three of whose robots do what was right for another seed.
+// In this evaluation robots replay the demonstration of another seed three times.
 const plan = (seeds) => ["--tasks", "handover", "--protocol", "benchmark", "--seeds", seeds];
 await played("collect", ...plan("2000"), "--out", join(runs, "demonstration"));
 await played("evaluate", "--policy", `open-loop:${join(runs, "demonstration")}`, ...plan("2001-2003"), "--jobs", "1", "--record", "--out", join(runs, "replayed"));
@@ -34,7 +34,7 @@ await pictures(await (async () => {
   return reader;
 })(), "report");
 
-// People begin one.
+// People start an episode.
 await page.goto(`${base}/operate`);
 await page.locator("option[value=handover]").waitFor({ state: "attached" });
 await page.locator("select[name=task]").selectOption("handover");
@@ -48,7 +48,7 @@ await pictures(page, "operate-links");
 const program = Object.fromEntries((await page.locator("pre").innerText()).split("\n").map((line) => line.split("=")));
 const episode = program.TANDEM_EPISODE;
 
-// One of them drives, beside a program.
+// One person drives together with a program.
 const driver = await open(seat);
 await driver.getByText("Time stands still").waitFor({ timeout: PATIENCE_MS });
 await pictures(driver, "drive-waits", SCENE);
@@ -62,7 +62,7 @@ await post(base, `/v1/episodes/${episode}/tools/say`, { text: "I wait for it at 
 await post(base, `/v1/episodes/${episode}/tools/wait`, { steps: 10 }, program.TANDEM_TOKEN);
 await pictures(driver, "drive", SCENE);
 
-// Others watch.
+// Other people watch.
 await page.goto(base);
 await pictures(page, "home");
 await page.goto(`${base}/watch?episode=${episode}`);
@@ -74,7 +74,7 @@ await page.goto(`${base}/watch`);
 await page.locator("progress").first().waitFor();
 await pictures(page, "cards", { settleMs: 500 });
 
-// It ends, is looked at again, and somebody takes over.
+// The episode ends, is opened again, and a person continues it.
 await fetch(`${base}/v1/episodes/${episode}`, { method: "DELETE" });
 await driver.getByText("The episode has ended").waitFor({ timeout: PATIENCE_MS });
 await pictures(driver, "drive-over", SCENE);
@@ -88,7 +88,7 @@ await page.click("text=Take over here");
 await page.getByText(/stood at 1\.0 s/).waitFor();
 await pictures(page, "take-over");
 
-// One that went wrong.
+// A failed episode follows.
 await page.goto(`${base}/watch`);
 await page.locator(".card", { has: page.locator(".badge.bad"), hasText: "replayed" }).first().click();
 await page.waitForSelector(".scrubber");

@@ -1,6 +1,6 @@
-// Reports lead to the pages: an evaluation whose robots replay the demonstration of another seed goes wrong, its report is opened as a
-// file, and each of its links as on the server that it names; the page stands a second before what went wrong. And the cards of the same
-// episodes. How it is run is said in shared/browser.mjs.
+// Links from reports to the pages. An evaluation whose robots replay the demonstration of another seed fails. Its report is opened as a
+// file, and each of its links on the named server. The page opens a second before the failure. The cards of the same episodes are also
+// tested. shared/browser.mjs describes how to run it.
 import assert from "node:assert/strict";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -29,7 +29,7 @@ for (const href of hrefs) {
 }
 await pictures(page, "from-report", { heights: { 400: 640, 1400: 1400, 2500: 1400 }, settleMs: 1500 });
 
-// A card of a failed episode opens where it failed, which is its end.
+// A card of a failed episode opens at its end, where it failed.
 await page.goto(`${base}/watch`);
 await page.locator(".card", { has: page.locator(".badge.bad") }).first().click();
 const moment = page.locator(".scrubber output");

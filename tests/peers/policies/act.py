@@ -1,4 +1,4 @@
-"""Plays an episode by a policy behind `/act`, with arrays as the package json_numpy writes them.
+"""Plays an episode by a policy behind `/act`, with arrays in the format of the package json_numpy.
 
     pip install -r tests/peers/policies/act.txt
     cargo build --release

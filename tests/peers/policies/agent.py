@@ -1,4 +1,4 @@
-"""Plays episodes by `gateway/examples/agents/agent.py`, two at a time, and looks at what is kept of them.
+"""Plays episodes by `gateway/examples/agents/agent.py`, two at a time, and checks their files.
 
     cargo build --release
     python tests/peers/policies/agent.py target/release/tandem

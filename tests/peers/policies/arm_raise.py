@@ -1,4 +1,4 @@
-"""A policy that does something that can be checked: robot A raises its left arm, robot B stays as it is. The checks are of what
+"""A policy that does something that can be checked: robot A raises its left arm, robot B keeps its posture. The checks are of what
 the policy is shown, of what it then feels, and of the results."""
 
 import json
@@ -38,7 +38,7 @@ class ArmRaise:
         return {"actions": rows}
 
     def check(self):
-        """What has been seen, by robot: 20 chunks each, after a trial with black pictures."""
+        """Checks the observations by robot: 20 chunks each, after a trial with black images."""
         trial, *looks = self.seen
         assert not trial["observation/image"].any() and not trial["observation/state"].any()
         assert len(looks) == 40, len(looks)
@@ -58,7 +58,7 @@ class ArmRaise:
 
 
 def evaluate(tandem, *flags):
-    """What `tandem evaluate` writes about Handover, seed 1."""
+    """Result of `tandem evaluate` for Handover, seed 1."""
     with tempfile.TemporaryDirectory() as folder:
         command = [tandem, "evaluate", "--tasks", "handover", "--seeds", "1", "--out", folder, *flags]
         done = subprocess.run(command, capture_output=True, text=True)

@@ -75,7 +75,7 @@ class Server:
 
 
 class Demonstration(Server):
-    """Tells the robots what an expert told them."""
+    """Repeats the commands of an expert."""
 
     def __init__(self, told):
         self.told, self.looks = told, {}
@@ -99,7 +99,7 @@ class Demonstration(Server):
 
 
 def asked(tandem, server, run):
-    """What `run` gives, of an address at which `server` answers behind the bridge."""
+    """Returns the result of `run` for an address at which `server` answers behind the bridge."""
     command = [sys.executable, BRIDGE, "--server", f"tcp://127.0.0.1:{server.port}", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
         try:

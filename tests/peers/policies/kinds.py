@@ -22,7 +22,7 @@ CONTROL_HZ = 50
 
 
 class Policy:
-    """Remembers what it is asked, by robot: words are a robot's own. The first request is a trial with zeros."""
+    """Stores its requests by robot, whose instructions differ. The first request is a trial with zeros."""
 
     def __init__(self):
         self.trial, self.seen = None, {}
@@ -105,7 +105,7 @@ class Reach(Policy):
 
 
 class Nudge(Policy):
-    """Turns joints of the right arm by steps towards where they are to be: differences to what is sensed, at 15 Hz."""
+    """Turns joints of the right arm by steps towards their targets: differences to the measured angles, at 15 Hz."""
 
     MAP = """
         preset = "openpi"
@@ -143,7 +143,7 @@ class Nudge(Policy):
 
 
 class Swing(Policy):
-    """Swings a wrist, faster and faster until it is as fast as it should be, by what it sees of two moments 0.1 s apart. It plans 16 rows
+    """Swings a wrist with increasing speed up to the target speed, by the observations of two moments 0.1 s apart. It plans 16 rows
     of 0.1 s and half of them are executed, as with diffusion policies."""
 
     MAP = """

@@ -52,7 +52,7 @@ class Forgetful(ArmRaise):
 
 
 class Slow(ArmRaise):
-    """Thinks for long at its third request."""
+    """Takes a long time for its third request."""
 
     def infer(self, observation):
         if len(self.seen) == 2:

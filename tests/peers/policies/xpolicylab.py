@@ -34,7 +34,7 @@ PARTS = {"left_arm_joint_state": 0, "right_arm_joint_state": 7, "left_ee_joint_s
 
 
 class Model:
-    """As XPolicyLab's models: `reset`, `update_obs`, `get_action`; one for all robots, told apart by their words."""
+    """A model like XPolicyLab's, with `reset`, `update_obs` and `get_action`. It serves all robots, and their instructions identify them."""
 
     def __init__(self, told, thinks_s=0.0):
         self.told, self.looks, self.resets, self.thinks_s = told, {}, 0, thinks_s
@@ -93,13 +93,13 @@ def serve(model, heard):
 
 
 def until_closed(heard):
-    """What a client says last is heard when it has gone already."""
+    """Waits for the last message of a client, which may arrive after the client has gone."""
     while heard[-1] != "close":
         time.sleep(0.01)
 
 
 def evaluate(tandem, urls, out):
-    """The one episode that is asked for, as the results have it."""
+    """Returns the result of the one requested episode."""
     command = [tandem, "evaluate", "--tasks", TASK, "--seeds", str(SEED), "--protocol", "benchmark"]
     subprocess.run([*command, "--policy", f"xpolicylab:{urls}", "--out", out], check=True)
     [episode] = json.loads((out / "results.json").read_text())["episodes"]

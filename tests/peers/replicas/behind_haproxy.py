@@ -1,4 +1,4 @@
-"""Two hundred scripted agents at three servers behind HAProxy, of which one is killed and one is added under way.
+"""Two hundred scripted agents at three servers behind HAProxy, one of which is killed and one added during the run.
 
     apt-get install haproxy
     python3 tests/peers/replicas/behind_haproxy.py target/release/tandem
@@ -28,7 +28,7 @@ GIVE_UP_S = 60.0
 
 
 class Caller:
-    """One agent's connections: it follows where it is sent, and repeats what has had no answer."""
+    """One agent's connections. It follows redirects, and repeats requests without an answer."""
 
     def __init__(self, port: int) -> None:
         self.entry = ("127.0.0.1", port)
@@ -36,7 +36,7 @@ class Caller:
         self.repeated = self.redirected = 0
 
     def post(self, path: str, body: object) -> tuple[int, dict, float]:
-        """The answer to a call, and how long the attempt took that was answered."""
+        """Returns the answer to a call, and the duration of the answered attempt."""
         key, deadline, address = uuid.uuid4().hex, time.monotonic() + GIVE_UP_S, self.entry
         while True:
             began = time.perf_counter()

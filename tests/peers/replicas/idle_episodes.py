@@ -1,4 +1,4 @@
-"""Two thousand episodes at one server, of which fifty are played: what they take, and what the fifty notice. The
+"""Two thousand episodes at one server, of which fifty are played: their memory, and their effect on the fifty. The
 fifty are alone before and after: whatever grows slower with their age is no matter of the others.
 
     python3 tests/peers/replicas/idle_episodes.py target/release/tandem
@@ -50,7 +50,7 @@ def play(ids: list[str], calls: int, think_s: float) -> dict[str, float]:
 
 
 def play_round(ids: list[str], calls: int, think_s: float) -> dict[str, float]:
-    """Plays each episode by an agent of its own."""
+    """Plays each episode by a separate agent."""
     looks_ms: list[float] = []
 
     def agent(episode: str) -> None:

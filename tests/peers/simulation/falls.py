@@ -1,4 +1,4 @@
-"""A robot alone on a floor that is sent anywhere: our physics, and MuJoCo's told the same.
+"""A single robot on a floor with random commands: our physics, and MuJoCo's under the same commands.
 
     python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/simulation/falls.txt
     cargo build --release
@@ -45,7 +45,7 @@ def floor_with_robot():
 
 
 class Energy:
-    """What can be known of a state, on data of its own."""
+    """Quantities of a state, computed with separate data."""
 
     def __init__(self, model):
         self.model, self.data = model, mujoco.MjData(model)
@@ -100,7 +100,7 @@ def play(model, targets_rad):
 
 
 def balance(model, data, energy, before, v, dofs, kp, kv, limit, places):
-    """Kinetic energy before, put in, taken and made in one step, J."""
+    """Energies of one step, J: initial kinetic energy, energy put in, removed and created."""
     after = data.qvel
     mass, gravity, coriolis, potential = energy.look(before, v)
     mass_now, _, _, potential_now = energy.look(data.qpos, after)

@@ -1,4 +1,4 @@
-"""Our physics against MuJoCo's: the same fourteen scenes, and the time of a step of the same robots.
+"""Comparison of our physics with MuJoCo's: the same fourteen scenes, and the time of a step of the same robots.
 
     python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/simulation/physics.txt
     cargo build --release
@@ -89,7 +89,7 @@ ALL = [
 
 
 def stiffened(model):
-    """The same scene with constraints so stiff and steps so short that the rest of softness does not matter."""
+    """The same scene with constraints so stiff and steps so short that the remaining softness has no effect."""
     model.opt.timestep = TRUTH_DT_S
     model.opt.impratio = TRUTH_FRICTION_TO_NORMAL_IMPEDANCE
     model.opt.tolerance = 1e-12

@@ -1,4 +1,4 @@
-"""Motion of boxes that slide on their base, without a simulator: what the scenes `box_slides` and `arm_pushes_box` have to do.
+"""Motion of boxes that slide on their base, without a simulator: reference for the scenes `box_slides` and `arm_pushes_box`.
 
 The base is rigid and stands on four springs of equal stiffness: its pressure is linear, and its moments balance those of the
 friction below the centre of mass. Every corner rubs after Coulomb. MuJoCo at short steps and with stiff contacts makes these
@@ -19,7 +19,7 @@ DAMPING_N_S_M = 300.0
 
 
 class Box:
-    """A box on the floor: where it is in the plane, and what its base rubs."""
+    """A box on the floor: its pose in the plane, and the friction of its base."""
 
     def __init__(self, model, name, qpos, qvel):
         body = model.body(name)
@@ -168,7 +168,7 @@ def arm_pushes_box(model, seconds, hz):
 
 
 def sampled(seconds, hz, advance, read):
-    """Readings at a rate, from 0 s to the end: samples x numbers, as the scene's sensors give them."""
+    """Readings at a rate, from 0 s to the end: samples x numbers, like those of the scene's sensors."""
     every = round(1.0 / (hz * DT_S))
     samples = [read()]
     for _ in range(round(seconds * hz)):

@@ -45,7 +45,7 @@ CASES = {
 
 
 class Kitchen:
-    """The kitchen of Handover with robots, in MuJoCo. Every robot has its bottle; where none holds it, one stands on the island."""
+    """The kitchen of Handover with robots, in MuJoCo. Every robot has its bottle; if no robot holds it, it stands on the island."""
 
     def __init__(self, robots, held):
         self.robots = robots
@@ -106,7 +106,7 @@ class Kitchen:
                 self.data.ctrl[actuator] += sign * offset
 
     def check(self):
-        """Nobody fell and nothing was dropped: otherwise the time is that of another situation."""
+        """Checks that no robot fell and no object was dropped. Otherwise the time is that of another situation."""
         for robot in range(self.robots):
             height = self.data.body(f"{robot}_pelvis").xpos[2]
             assert height > FALLEN_HEIGHT_M, f"robot {robot} fell: pelvis at {height:.2f} m"
@@ -151,7 +151,7 @@ def ours():
 
 
 def compare(path):
-    """Prints the table, writes `path` if given; whether we are as fast as we say."""
+    """Prints the table, and writes it to `path` if given. Returns whether the published speed is reached."""
     before = theirs()
     tandems = {(case["name"], case["robots"]): case for case in ours()}
     after = theirs()

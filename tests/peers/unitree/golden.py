@@ -1,4 +1,4 @@
-"""Writes messages as Unitree's own types serialize them, for the tests of the wheel, which need neither DDS nor the SDK.
+"""Writes messages, serialized by Unitree's own types, for the tests of the wheel, which need neither DDS nor the SDK.
 
     python tests/peers/unitree/golden.py > gateway/python/tests/unitree/golden.json
 

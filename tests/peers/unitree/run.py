@@ -1,4 +1,4 @@
-"""Programs that others wrote for a Unitree G1 drive Tandem's robots, each in a network namespace with `lo` alone.
+"""Other projects' programs for a Unitree G1 drive Tandem's robots, each in a network namespace with `lo` alone.
 
     python tests/peers/unitree/run.py --wheel target/wheels/tandem_sim-*.whl
     python tests/peers/unitree/run.py --wheel target/wheels/tandem_sim-*.whl sdk latency
@@ -70,11 +70,11 @@ CASES = {
 
 
 class Skipped(Exception):
-    """Something cannot be had on this machine."""
+    """A requirement is missing on this machine."""
 
 
 def command(*words, **options):
-    """Runs a command to its end, or says that it is to be skipped."""
+    """Runs a command to its end, or raises the exception for a skipped case."""
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
     except OSError as error:
@@ -102,7 +102,7 @@ def interpreter_of(version):
 
 
 def environment(folder, version, *installs):
-    """Returns the interpreter of an environment, which is made unless it is there."""
+    """Returns the interpreter of an environment, and creates the environment if necessary."""
     python = folder / "bin" / "python"
     done, wanted = folder / "complete.txt", "\n".join(fingerprint(word) for install in installs for word in install)
     if done.exists() and done.read_text() == wanted:
@@ -153,7 +153,7 @@ def bring_up_lo():
 
 
 def wait_until_served(bridge, log):
-    """Waits until every robot has said where it is reached."""
+    """Waits until every robot has printed its address."""
     deadline_s = time.monotonic() + STARTING_S
     while "DDS domain" not in log.read_text():
         if bridge.poll() is not None or time.monotonic() > deadline_s:
@@ -185,7 +185,7 @@ def inside(case, pythons):
 
 
 def run(name, makers, made):
-    """Runs one case in a namespace of its own; returns whether it has passed."""
+    """Runs one case in a separate namespace. Returns True if it has passed."""
     case = CASES[name]
     if case.needs_variable is not None and case.needs_variable not in os.environ:
         raise Skipped(f"{case.needs_variable} is not set")

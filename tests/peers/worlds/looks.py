@@ -49,7 +49,7 @@ SCENES = (
 
 
 def camera(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the places of the eye and of what it looks at, in metres."""
+    """Returns the places of the eye and of its target, in metres."""
     middle = np.array(model.stat.center)
     return middle - VIEW / np.linalg.norm(VIEW) * DISTANCE * model.stat.extent, middle
 

@@ -1,4 +1,4 @@
-//! Tests of viewers: they need the link alone, see the episode, and change nothing.
+//! Tests of viewers: they need only the link, see the episode, and have no effect on it.
 
 use std::collections::BTreeSet;
 use std::net::TcpStream;
@@ -196,7 +196,7 @@ fn watching_changes_nothing() {
     let play = |watchers: usize| {
         let server = TestServer::start();
         let id = server.episode("benchmark");
-        // The viewers read nothing that they are sent; the episode does not wait for them.
+        // The viewers do not read the data that is sent to them. The episode does not wait for viewers.
         let sockets: Vec<_> = (0..watchers).map(|_| watch(&server, &id)).collect();
         for (tool, args) in (0..8).flat_map(|_| calls()) {
             server.tool(&id, tool, &args).ok();
@@ -368,7 +368,7 @@ fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
     }
 }
 
-/// An agent's notes are shown as they arrive, and so are refusals that do not reach the episode.
+/// An agent's notes are shown when they arrive, and so are refusals that do not reach the episode.
 #[test]
 fn notes_and_refusals_are_seen_as_they_come() {
     let server = TestServer::start();

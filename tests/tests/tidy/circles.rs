@@ -11,8 +11,8 @@ use super::{
 /// Dependencies between the children of one module: from, to, and the first place with such a dependency.
 type Siblings<'a> = BTreeMap<(&'a str, &'a str), &'a str>;
 
-/// Groups dependencies by the parent module. A file and its folder belong together, so two children of
-/// one parent are compared, whatever is below them.
+/// Groups dependencies by the parent module. A file and its folder belong together, so two children of one
+/// parent are compared, including all modules below them.
 fn levels(arrows: &[Arrow]) -> BTreeMap<&[String], Siblings<'_>> {
     let mut levels: BTreeMap<&[String], Siblings> = BTreeMap::new();
     for Arrow { from, to, place } in arrows {

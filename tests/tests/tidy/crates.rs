@@ -11,7 +11,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("tools_spec", &[]),
     ("ik", &[]),
     ("sim", &[]),
-    // The same sources with every extra.
+    // Crates that compile the same sources with every extra.
     ("tests/extras", &[]),
     ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
     ("episodes/evaluation", &["tandem-episodes", "tandem-sim", "tandem-tools-spec"]),

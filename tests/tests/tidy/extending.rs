@@ -94,7 +94,7 @@ const STEPS: &[Step] = &[
         folder: "sim/src/render",
         extension: "rs",
         says: "impl Renderer for",
-        // In OpenAPI, "path" is where a parameter stands.
+        // In OpenAPI, "path" is the place of a parameter.
         may: &["sim/src/render/", "tools_spec/src/schema/openapi.rs"],
     },
 ];

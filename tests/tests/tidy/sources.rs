@@ -70,7 +70,7 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Fails with `rule` and the list of what breaks it.
+/// Fails with `rule` and the list of violations.
 #[track_caller]
 pub fn expect_none(wrong: &[String], rule: &str) {
     assert!(wrong.is_empty(), "{rule}:\n  {}", wrong.join("\n  "));

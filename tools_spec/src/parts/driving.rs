@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// The shortest and the longest patience, in seconds.
+/// Minimum and maximum patience, in seconds.
 const PATIENCE_S: [f64; 2] = [0.05, 600.0];
 
 /// By whom an episode is driven.

@@ -1,5 +1,5 @@
-//! Notes of a player on its own play, for those who read the episode later. A note is no tool: it changes
-//! nothing of the episode, and no policy sees it.
+//! Notes of a player on its own play, for later readers of the episode. A note is no tool: it does not affect
+//! the episode, and no policy sees it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,13 +9,13 @@ use crate::error::SpecError;
 use crate::limits::{ROBOT_PATTERN, one_of};
 use crate::tool::read_as;
 
-/// The most characters of a note: more than a model says in one go.
+/// Maximum number of characters of a note: more than a model says at once.
 const MAX_CHARACTERS: usize = 50_000;
-/// The characters that results keep of how a model's play ended.
+/// Number of characters that results keep of the end of a model's play.
 const MAX_ENDING_CHARACTERS: usize = 500;
-/// The most characters of a model's name.
+/// Maximum number of characters of a model's name.
 const MAX_NAME_CHARACTERS: usize = 200;
-/// The most tokens, dollars and seconds of one note: what is more has been counted wrongly.
+/// Maximum tokens, dollars and seconds of one note; larger numbers are counting errors.
 const MAX_TOKENS: u32 = 1_000_000_000;
 const MAX_USD: f64 = 1e6;
 const MAX_SECONDS: f64 = 1e6;

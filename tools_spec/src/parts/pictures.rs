@@ -1,5 +1,4 @@
-//! Pictures as JSON and MessagePack carry them, in which form they come to programs, and how pixels of them
-//! are named.
+//! Images in JSON and MessagePack: their formats for programs, and the naming of their pixels.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use schemars::JsonSchema;

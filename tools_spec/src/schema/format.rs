@@ -1,4 +1,4 @@
-//! Specifications of tools in the very form that the official SDKs of model hosts take.
+//! Specifications of tools in the form that the official SDKs of model hosts accept.
 
 use serde_json::{Map, Value, json};
 
@@ -69,10 +69,10 @@ impl ToolSpec {
         })
     }
 
-    /// Returns the tool for MCP. A host that leaves `short` out gets the short reply, which the server's
-    /// instructions say once. Has no output schema, since clients drop the pictures of tools that declare
-    /// one, and only the annotations that are not MCP's defaults: a list of tools is read by a model in
-    /// every conversation.
+    /// Returns the tool for MCP. A host that leaves `short` out gets the short reply, as the server's
+    /// instructions say. The tool has no output schema, since clients drop the images of tools that declare
+    /// one. It has only annotations that differ from MCP's defaults, because a model reads the list of tools
+    /// in every conversation.
     fn of_mcp(&self) -> Value {
         let mut schema = Value::Object(self.lenient_schema());
         slim(&mut schema);
@@ -94,7 +94,7 @@ impl ToolSpec {
 }
 
 impl ToolSpec {
-    /// Returns true if MCP clients may get its reply as structured content. Clients drop the pictures of a tool
+    /// Returns true if MCP clients may get its reply as structured content. Clients drop the images of a tool
     /// that declares such content.
     pub fn has_structure(&self) -> bool {
         self.name != Observe::NAME
@@ -105,7 +105,7 @@ impl ToolSpec {
         let mut tool = self.of_mcp();
         if self.has_structure() {
             tool["outputSchema"] = match self.name {
-                // An operator who leaves before the others gets a status in place of the result.
+                // An operator that leaves before the others gets a status in place of the result.
                 Finish::NAME => json!({ "type": "object" }),
                 _ => outline(&self.reply_schema),
             };
@@ -125,12 +125,13 @@ fn outline(schema: &Value) -> Value {
     json!({ "type": "object", "properties": properties, "required": schema["required"] })
 }
 
-/// Required fields whose names say what they are.
+/// Required fields with self-explanatory names.
 const PLAIN_NAMES: [&str; 3] = ["episode_id", "robot", "robots"];
-/// Fields whose names say what they are, beside those of the left hand and in the pelvis frame.
+/// Fields with self-explanatory names, beside those of the left hand and in the pelvis frame.
 const PLAIN_EVERYWHERE: [&str; 4] = ["right_position_m", "right_quaternion_wxyz", "vx_m_s", "yaw_rate_rad_s"];
 
-/// Drops what names say and what the server checks by itself: defaults, and that no other fields are known.
+/// Drops parts that names already express or that the server checks: defaults, and the exclusion of other
+/// fields.
 fn slim(schema: &mut Value) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(slim),

@@ -1,9 +1,9 @@
-//! Fields that need not be given, as the faces say so: by null, or by leaving them out.
+//! Optional fields, expressed by null or by omission.
 
 use serde_json::{Map, Value, json};
 
-/// Makes two choices of two types of one field. Strict hosts and common MCP clients read those; not all of
-/// them read a list of types.
+/// Rewrites two types of a field as two alternatives. Strict hosts and common MCP clients read those; not all
+/// of them read a list of types.
 pub fn as_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(kinds)) = object.get("type") else { return };
     let kinds = kinds.clone();
@@ -21,8 +21,8 @@ pub fn as_choices(object: &mut Map<String, Value>) {
     object.insert("anyOf".into(), choices.into());
 }
 
-/// Has fields that may be null be left out in place of it: on every level, or, where the call's own fields
-/// are to stay as they are, only in what its lists hold. Their texts say so, too.
+/// Makes nullable fields optional instead: at every level, or only within lists if the call's own fields have
+/// to stay nullable. Their texts change accordingly.
 pub fn leave_out(schema: &mut Value, own_fields: bool) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| leave_out(item, own_fields)),
@@ -54,7 +54,7 @@ fn leave_out_own(object: &mut Map<String, Value>) {
     }
 }
 
-/// Returns the schema of a field that may be null as one that may be left out.
+/// Returns the schema of a nullable field as that of an optional one.
 fn the_choice_beside_null(property: &Value) -> Option<Value> {
     let choices = property["anyOf"].as_array()?;
     let is_null = |choice: &&Value| choice["type"] == "null";

@@ -124,7 +124,7 @@ fn list_tools(specs: Value) -> Value {
     list
 }
 
-/// Returns a page, which is a few lines of text for who does not accept `text/html`.
+/// Returns a page, which is a few lines of text for clients that do not accept `text/html`.
 fn page(id: &str, description: &str) -> Value {
     let description =
         format!("{description} For a call that does not accept text/html, a few lines of text.");
@@ -154,8 +154,8 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
-/// Adds the step to every reply of an episode, and a failure of its recording; operators
-/// of single robots hear of each other.
+/// Adds to every reply of an episode its step and a failure of its recording. Operators of single robots also
+/// get the states and messages of the others.
 fn with_notice(mut reply: Value) -> Value {
     let list =
         |of: Value, description: &str| json!({ "type": "array", "items": of, "description": description });
@@ -186,7 +186,7 @@ fn with_notice(mut reply: Value) -> Value {
     reply
 }
 
-/// Lets a body be left out where no field of it is required.
+/// Makes a body optional if none of its fields is required.
 fn json_body(schema: Value) -> Value {
     let required = schema["required"].as_array().is_some_and(|fields| !fields.is_empty());
     json!({ "required": required, "content": { "application/json": { "schema": schema } } })

@@ -1,4 +1,4 @@
-//! JSON Schema of types as they are: for replies and REST bodies, where nothing has to be strict.
+//! JSON Schema of types without strictness: for replies and REST bodies.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
@@ -10,15 +10,14 @@ use crate::parts::{Assistance, Operators, Wording};
 const FULL_ONLY: &str = "full_only";
 const FOR_OPERATORS: &str = "for_operators";
 
-/// Returns the schema of `T` as it is, for replies: nothing has to be strict about what the server itself
-/// sends.
+/// Returns the schema of `T` for replies. It is not strict, because the server itself sends them.
 pub fn plain_schema<T: JsonSchema>() -> Value {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Returns the schema of `T` as arguments that a list of tools describes: where a policy is told less, in the
-/// texts for that, and where one policy directs all robots, without the fields that are for operators.
+/// Returns the schema of `T` as arguments in a list of tools. Its texts are those for the policy's
+/// assistance. If one policy directs all robots, the fields for operators are left out.
 pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     if wording.operators == Operators::One {
@@ -28,8 +27,8 @@ pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     schema
 }
 
-/// Returns the schema of `T` as a body that is read: what the checks refuse, it does not allow. How many
-/// control steps a command may have is still to be said.
+/// Returns the schema of `T` as a body that is parsed. It excludes values that the checks refuse. The maximum
+/// number of control steps is added later.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     word(&mut schema, wording);

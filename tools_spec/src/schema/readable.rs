@@ -1,5 +1,5 @@
-//! JSON Schema for a reader: a model that sees the list of an episode's tools. It says types, lengths and
-//! bounds, and leaves out what a refusal says when it matters.
+//! JSON Schema for a reader, which is a model that sees the list of an episode's tools. It contains types,
+//! lengths and bounds, and leaves out texts that refusals contain.
 
 use serde_json::{Map, Value};
 
@@ -21,8 +21,8 @@ const FOR_VALIDATORS: &[&str] = &[
     "uniqueItems",
 ];
 
-/// Rewrites the schema of a body: fields that may be null may be left out, and what only validators need is
-/// dropped.
+/// Rewrites the schema of a body: fields that may be null may be left out, and parts that only validators
+/// need are dropped.
 pub fn make_readable(schema: &mut Value) {
     for_each(schema, &mut |object| {
         list_choices(object);

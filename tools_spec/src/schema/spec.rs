@@ -21,7 +21,7 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Map<String, Value>,
-    /// The same with the defaults of what may be left out.
+    /// This schema with the defaults of optional fields.
     #[serde(skip)]
     with_defaults: Map<String, Value>,
     /// The schema of [`ToolSpec::body_schema`], where fields that count control steps are only marked.
@@ -66,13 +66,13 @@ pub struct EpisodeToolSpec {
     pub read_only: bool,
     /// Its REST route.
     pub route: Route,
-    /// JSON Schema of the body without what a refusal says when it matters.
+    /// JSON Schema of the body without texts that refusals contain.
     pub body_schema: Value,
 }
 
 impl ToolSpec {
     /// Returns the specification of `T`, which acts on an episode; without a path to name it, the arguments
-    /// carry `episode_id`. It may be for operators who talk alone.
+    /// carry `episode_id`. It may be limited to operators that talk.
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
         if spec.input_schema["properties"].get(SHORT).is_none() {
@@ -114,12 +114,13 @@ impl ToolSpec {
         }
     }
 
-    /// Lets a body be only what fits one of these schemas, too.
+    /// Requires a body to fit one of these schemas, too.
     pub(crate) fn demand_one_of(&mut self, conditions: Value) {
         self.marked_body["anyOf"] = conditions;
     }
 
-    /// Returns the schema of a plan's command that names this tool. Its steps may be more with `until`.
+    /// Returns the schema of a plan's command that names this tool. A command with `until` may have more
+    /// steps.
     pub(crate) fn as_planned(&self) -> Value {
         let mut arguments = self.marked_body.clone();
         arguments.as_object_mut().and_then(|arguments| arguments.shift_remove("$schema"));
@@ -135,22 +136,22 @@ impl ToolSpec {
         command
     }
 
-    /// Lets the commands of a plan be only what fits one of these schemas, too.
+    /// Requires the commands of a plan to fit one of these schemas, too.
     pub(crate) fn demand_of_commands(&mut self, planned: Vec<Value>) {
         self.marked_body["properties"]["commands"]["items"]["anyOf"] = planned.into();
     }
 
-    /// Returns the JSON Schema of a REST body, which need not be strict: what may be null may be left out,
-    /// and lengths are said. A command may have up to `most_steps` control steps.
+    /// Returns the JSON Schema of a REST body, which need not be strict. Nullable fields are optional, and
+    /// lengths are stated. A command may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {
         let mut schema = self.marked_body.clone();
         bound_steps(&mut schema, most_steps);
         schema
     }
 
-    /// Returns the strict schema with one thing let go: what may be null is left out instead, and has its
-    /// default. For hosts that check arguments against the schema and do not insist on strictness, as those
-    /// of MCP.
+    /// Returns the strict schema with one relaxation: nullable fields are optional instead, and have their
+    /// defaults. It is for hosts that check arguments against the schema without insisting on strictness, for
+    /// example those of MCP.
     pub fn lenient_schema(&self) -> Map<String, Value> {
         leaving_out(&self.with_defaults, true)
     }
@@ -162,7 +163,7 @@ impl ToolSpec {
         leaving_out(&self.input_schema, false)
     }
 
-    /// Returns the tool as the running episode `id` has it, for a caller who commands these `robots`.
+    /// Returns the tool for the running episode `id`, for a caller that commands these `robots`.
     pub fn of_episode(self, id: &str, robots: &[String], most_steps: u32) -> EpisodeToolSpec {
         let mut body_schema = self.body_schema(most_steps);
         bound_robots(&mut body_schema, robots);

@@ -48,12 +48,12 @@ pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String
     (description, object)
 }
 
-/// The field by which every tool is asked for a short reply, and what it says.
+/// The field that requests a short reply of any tool, and its text.
 pub const SHORT: &str = "short";
 pub const SHORTLY: &str = "True: a shorter reply, without what is as expected.";
 
-/// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be
-/// null, so it may not.
+/// Adds the field that requests a short reply. Strict hosts limit the number of nullable fields, so it is not
+/// nullable.
 pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
     let mut short = json!({ "type": "boolean", "description": SHORTLY });
     if default {
@@ -67,7 +67,7 @@ pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
     }
 }
 
-/// Adds the handle that stands in the path over REST and among the arguments everywhere else.
+/// Adds the handle that is in the path over REST and among the arguments everywhere else.
 pub fn require_episode_id(schema: &mut Map<String, Value>) {
     let handle = json!({ "type": "string", "description": "The episode." });
     if let Some(Value::Object(properties)) = schema.get_mut("properties") {
@@ -100,8 +100,8 @@ fn make_strict(schema: &mut Value) {
             if object.get("type").is_some_and(|kind| kind == "object") {
                 close_object(object);
             }
-            // A property may be called like a keyword, so names are walked past and only their schemas are
-            // made strict.
+            // A property may have the name of a keyword, so only the schemas of properties are made strict,
+            // not their names.
             for (keyword, value) in object.iter_mut() {
                 match value {
                     Value::Object(properties) if keyword == "properties" => {
@@ -122,9 +122,9 @@ pub fn unwrap_lines(object: &mut Map<String, Value>) {
     }
 }
 
-/// Replaces `oneOf`, which strict hosts refuse and which is how schemars writes an enum whose variants are
-/// described: the names become an `enum` and their descriptions part of the enum's own. Of any other
-/// `oneOf` only the texts are left.
+/// Replaces `oneOf`, which strict hosts refuse and which schemars writes for an enum with described variants.
+/// The names become an `enum`, and their descriptions part of the enum's description. Of any other `oneOf`
+/// only the texts remain.
 pub fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;
@@ -145,7 +145,7 @@ pub fn list_choices(object: &mut Map<String, Value>) {
 }
 
 fn close_object(object: &mut Map<String, Value>) {
-    // What may be any object stays so.
+    // A field that accepts any object stays so.
     if object.get("additionalProperties") == Some(&Value::Bool(true)) {
         return;
     }

@@ -10,7 +10,7 @@ use crate::tool::Tool;
 /// Every tool, and the types that their arguments and replies are made of.
 #[derive(Debug, Clone)]
 pub struct TypedTools {
-    /// In the order in which policies meet them.
+    /// Tools in the order in which policies see them.
     pub tools: Vec<TypedTool>,
     /// JSON Schema of each type by its name, which `#/$defs/NAME` refers to.
     pub types: Map<String, Value>,
@@ -49,7 +49,7 @@ impl TypedToolsCollector {
         self.tools.push(TypedTool { name: T::NAME, arguments, reply, on_episode, for_operators });
     }
 
-    /// Adds a type that stands within a reply and has a name of its own all the same.
+    /// Adds a type inside a reply that nevertheless has its own name.
     pub fn add_type<T: JsonSchema>(&mut self) {
         self.generator.subschema_for::<T>();
     }

@@ -1,4 +1,4 @@
-//! `check_reach`: whether the arms could get to a pose, without moving.
+//! `check_reach`: tests without moving whether the arms could reach a pose.
 //! `episodes/src/commands/check_reach.rs` answers it.
 
 use schemars::JsonSchema;

@@ -1,4 +1,4 @@
-//! `get_status`: where the episode stands. `episodes/src/session/status.rs` answers it.
+//! `get_status`: the state of the episode. `episodes/src/session/status.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! `list_tasks`: what can be started. `gateway/src/hosting/table.rs` answers it.
+//! `list_tasks`: the tasks that can be started. `gateway/src/hosting/table.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -9,7 +9,7 @@ use crate::limits;
 use crate::parts::{CommandReply, PoseFrame};
 use crate::tool::Tool;
 
-/// Softer hands would be thrown about by what they feel of their own motion.
+/// Softer hands would be thrown about by the forces that they sense of their own motion.
 const MIN_COMPLIANCE_N_S_M: f64 = 50.0;
 const MIN_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
 

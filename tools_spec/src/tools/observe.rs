@@ -1,4 +1,4 @@
-//! `observe`: what the robots see and feel. `episodes/src/observation/observer.rs` answers it.
+//! `observe`: images and sensor readings of the robots. `episodes/src/observation/observer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, ser::SerializeStruct};

@@ -1,5 +1,5 @@
-//! `query_depth`: how far away the thing at a pixel is, and where that is for the robot's hands.
-//! `episodes/src/observation/observer.rs` answers it.
+//! `query_depth`: measures points, surfaces and planes at pixels. `episodes/src/observation/observer.rs`
+//! answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! `say`: operators of one episode talk. Offered only in an episode that was started so.
-//! `gateway/src/hosting/team/` lets the others hear it.
+//! `say`: messages between the operators of an episode, offered only if the episode was started with them.
+//! `gateway/src/hosting/team/` delivers them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::get_status::StatusReply;
 use crate::tool::Tool;
 
-/// The most characters that are said at once.
+/// Maximum number of characters of one message.
 const MAX_CHARACTERS: usize = 500;
 
 /// Say something to the operators of the other robots: at most 500 characters, which they hear with their

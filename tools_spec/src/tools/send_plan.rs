@@ -137,9 +137,9 @@ impl SendPlan {
     /// Tools that a plan may name: every command, and walks to a place.
     pub const COMMANDS: [&str; 5] =
         [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME, WalkTo::NAME];
-    /// Commands that may go on until something is so.
+    /// Commands that may continue until a condition holds.
     pub const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
-    /// Control steps of a command that goes on until something is so: as many as a walk's, half a minute.
+    /// Maximum number of control steps of a command with `until`: that of a walk, half a minute.
     pub const MAX_UNTIL_STEPS: u32 = 1500;
 
     /// Returns what messages call the command at `index`.

@@ -1,4 +1,4 @@
-//! `start_episode`: makes a world and says what stands in it. `gateway/src/hosting/table.rs` carries it out.
+//! `start_episode`: builds a world and describes it. `gateway/src/hosting/table.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

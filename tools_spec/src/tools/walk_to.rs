@@ -1,5 +1,5 @@
-//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/plan/` carries it out as
-//! a row of commands.
+//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/plan/` carries it out as a
+//! sequence of commands.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,9 +9,9 @@ use crate::limits;
 use crate::parts::{PlanReply, PoseFrame};
 use crate::tool::Tool;
 
-/// The most control steps of one call: thirty seconds.
+/// Maximum number of control steps of one call: thirty seconds.
 const MAX_STEPS: u32 = 1500;
-/// The most waypoints of a robot.
+/// Maximum number of waypoints of a robot.
 const MAX_WAYPOINTS: usize = 10;
 
 /// Walk to places by odometry; arms go along, or push and carry with `carry`. Short commands, each a tool

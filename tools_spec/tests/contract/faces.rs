@@ -1,9 +1,9 @@
-//! The faces that one contract has: strict and lenient, of any episode and of one that runs.
+//! Forms of the contract: strict and lenient, of any episode and of a running one.
 
 use serde_json::{Map, Value, json};
 use tandem_tools_spec::{Format, Hints, ToolSpec, Wording, episode_tool_specs, openapi, tool_specs};
 
-/// Returns everything that a policy is told of the tools, face by face.
+/// Returns all texts about the tools that a policy reads, form by form.
 fn faces(hints: Hints) -> Vec<String> {
     let specs = tool_specs(hints);
     let mut faces = vec![
@@ -18,7 +18,7 @@ fn faces(hints: Hints) -> Vec<String> {
     faces.iter().map(|face| face.to_string().replace("\\n", " ")).collect()
 }
 
-/// Recipes for grasping are the brief's, which is read once.
+/// Recipes for grasping are in the brief, which is read once.
 #[test]
 fn every_face_tells_the_hands_geometry_and_no_recipe() {
     const GEOMETRY: [&str; 3] =
@@ -156,7 +156,7 @@ fn what_may_be_null_may_be_left_out_but_of_the_strict_schema() {
     assert_eq!((body("query_depth"), body("observe")), (json!(["robot"]), Value::Null));
 }
 
-/// Schemas that need not be strict say what stands for what is left out; strict hosts refuse that.
+/// Lenient schemas state the defaults of omitted fields; strict hosts refuse defaults.
 #[test]
 fn what_may_be_left_out_has_its_default() {
     let entry = "/properties/robots/items/properties";
@@ -180,7 +180,7 @@ fn what_may_be_left_out_has_its_default() {
     }
 }
 
-/// A team that carries goes by its waypoints together.
+/// A team that carries passes its waypoints together.
 #[test]
 fn robots_that_carry_have_as_many_waypoints_as_each_other() {
     let call = |carry: bool, counts: [usize; 2]| {
@@ -197,8 +197,7 @@ fn robots_that_carry_have_as_many_waypoints_as_each_other() {
     assert!(call(false, [11, 0]).is_some_and(|refusal| refusal.contains("10 at most")));
 }
 
-/// Arguments that are shown to a caller are such as its schema has them: with the episode where it is named
-/// there, and without null.
+/// Example arguments for a caller fit its schema. They name the episode if the schema does, and have no null.
 #[test]
 fn examples_fit_the_schemas() {
     for name in ["check_reach", "move_wrists", "query_depth", "walk_to", "observe"] {

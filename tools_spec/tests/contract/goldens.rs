@@ -1,4 +1,4 @@
-//! The contract as its callers see it, kept in files: a change of the one shows as a change of the other.
+//! Golden files of the contract as its callers see it: a change of the contract shows as a change of a file.
 //!
 //! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract goldens` writes them anew.
 
@@ -43,7 +43,7 @@ fn tools_of_paper() {
     check("paper", &differing(tool_specs(Hints::Off), tool_specs(Assistance::Paper)));
 }
 
-/// That robots have equally many rows is said in fifty alternatives, of which three are kept.
+/// Fifty alternatives state that robots have equally many rows; the golden file keeps three of them.
 #[test]
 fn openapi_document() {
     let mut document = openapi("0.0.0", Hints::On, false);

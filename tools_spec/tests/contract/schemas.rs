@@ -1,4 +1,4 @@
-//! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
+//! The contract as its two readers see it: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{
@@ -122,7 +122,7 @@ fn nullable_fields_may_be_left_out() {
     assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
-/// Returns a refusal must contain every one of `says`.
+/// Checks that a refusal contains every one of `says`.
 fn refused(name: &str, args: Value, says: &[&str]) {
     let text = match ToolCall::parse(name, args.clone()) {
         Ok(call) => panic!("{name} {args} was accepted: {call:?}"),

@@ -57,11 +57,11 @@ pub struct BatchSpec {
 /// Start of the next episode in a world whose last one is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Autoreset {
-    /// In place of the step after the last.
+    /// The next episode begins in place of the step after the last.
     NextStep,
-    /// In the last step itself.
+    /// The next episode begins in the last step itself.
     SameStep,
-    /// Only when the world is reset.
+    /// An episode begins only when the world is reset.
     Disabled,
 }
 
@@ -136,8 +136,8 @@ impl Batch {
         outcomes.into_iter().map(Option::transpose).collect()
     }
 
-    /// Carries out a row of each robot in each world, or begins its next episode. `last` receives the final
-    /// observation of an episode whose world begins anew in the same step. If any action is invalid, no
+    /// Executes a row of each robot in each world, or begins the world's next episode. `last` receives the
+    /// final observation of an episode if the next one begins in the same step. If any action is invalid, no
     /// world steps.
     ///
     /// # Errors

@@ -36,9 +36,9 @@ impl Threads {
         Threads { helpers: (1..threads).filter_map(helper).collect() }
     }
 
-    /// Runs jobs and returns their results. A thread begins with the jobs that it also had in the last
-    /// round, whose data are in its caches. When it is done it takes over jobs of other threads, because
-    /// worlds differ in the cost of a step.
+    /// Runs jobs and returns their results. A thread begins with the jobs that it had in the last round,
+    /// because their data are in its caches. It then takes over jobs of other threads, because worlds differ
+    /// in the cost of a step.
     pub fn map<R: Send + 'static>(
         &self,
         jobs: usize,
@@ -60,7 +60,7 @@ impl Threads {
             }
         });
         for helper in &self.helpers {
-            // A missing thread does no harm: every thread does what is left.
+            // A missing thread does no harm: the others do its jobs.
             let _ = helper.send(round.clone());
         }
         round(0);
@@ -121,7 +121,7 @@ mod tests {
         let (first, second) = (slow(), slow());
         let of = |ids: &[thread::ThreadId]| ids.iter().map(|id| format!("{id:?}")).collect::<BTreeSet<_>>();
         assert_eq!((of(&first).len(), of(&first)), (2, of(&second)));
-        // All but the slow job are done by the other thread long before that one ends.
+        // The other thread finishes all other jobs long before the slow one ends.
         assert!(first[1..].iter().all(|id| *id == first[7] && *id != first[0]), "{first:?}");
     }
 

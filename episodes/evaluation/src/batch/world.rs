@@ -115,8 +115,8 @@ impl BatchWorld {
         self.begin(spec)
     }
 
-    /// Begins the next episode of the round. Its seed depends on its index alone: that another episode
-    /// ended sooner does not change it.
+    /// Begins the next episode of the round. Its seed depends on its index alone: an early end of another
+    /// episode does not change it.
     fn begin(&mut self, spec: &BatchSpec) -> Result<SeenStep, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));

@@ -1,5 +1,5 @@
-//! Cache of single episodes: each is stored in a file of its own. The next run takes it from there if it is
-//! the same.
+//! Cache of single episodes. Each is stored in a separate file. The next run uses it if the episode is the
+//! same.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

@@ -12,10 +12,10 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::{EvaluationPlan, Starts};
 use crate::results::{PlayedEpisode, PolicyCard, SeedList};
 
-/// Largest number of differences that an error names.
+/// Maximum number of differences that an error names.
 const MAX_DIFFERENCES: usize = 6;
 
-/// Longest part of a folder's name that comes from the policy's name, in characters.
+/// Maximum length of the part of a folder's name that comes from the policy's name, in characters.
 const MAX_NAME_CHARS: usize = 40;
 
 /// Fields of a spec that differ between the episodes of a run.

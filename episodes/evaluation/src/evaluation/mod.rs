@@ -130,7 +130,8 @@ pub struct KeptEpisodes {
     /// Number of cached episodes that another build has played.
     pub of_other_builds: usize,
     pub to_play: usize,
-    /// Number of episodes to play whose result this build cannot read, and which it replaces.
+    /// Number of episodes whose result this build cannot read. They are played again, and the results
+    /// replaced.
     pub unreadable: usize,
 }
 
@@ -139,7 +140,7 @@ impl<'a> EvaluationRun<'a> {
     ///
     /// # Errors
     ///
-    /// Returns [`EvaluationError::OtherRun`] if the folder holds another run, of which nothing is touched.
+    /// Returns [`EvaluationError::OtherRun`] if the folder holds another run, which is not touched.
     pub fn begin(plan: &'a EvaluationPlan, folder: &'a Path) -> Result<EvaluationRun<'a>, EvaluationError> {
         let build = tandem_episodes::build().map_err(EpisodeError::Build)?;
         let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name();

@@ -119,10 +119,11 @@ pub enum Starts {
     Phases {
         /// Folder that `tandem collect` or `tandem serve` wrote.
         demonstrations: PathBuf,
-        /// Numbers or ids, for example `p2` or `transfer`; a task without such a phase has no episode of
-        /// it.
+        /// Numbers or ids, for example `p2` or `transfer`. A task without such a phase has no episode that
+        /// begins there.
         phases: Vec<String>,
-        /// True if episodes begin in the training demonstrations, whose seeds replace the plan's.
+        /// True if episodes begin in the training demonstrations. The demonstrations' seeds replace the
+        /// plan's.
         training: bool,
     },
     /// Each begins `before_s` seconds before the failure of one of these episodes, in its world. Tasks and
@@ -138,7 +139,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Share of a process that plays everything.
+    /// Share of a process that plays all episodes.
     pub const WHOLE: Shard = Shard { index: 0, of: 1 };
 }
 
@@ -201,8 +202,8 @@ impl EvaluationPlan<'_> {
         self.named(EpisodeSpec::peculiarities)
     }
 
-    /// Collects `of` over its episodes. The result is the same for all of them, except for task files,
-    /// instructions, and retried moments.
+    /// Applies `of` to an episode of each kind and collects the results. They depend only on task files,
+    /// instructions and retried moments.
     fn named(&self, of: fn(&EpisodeSpec) -> Vec<String>) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
@@ -261,7 +262,7 @@ impl EvaluationPlan<'_> {
         }
     }
 
-    /// Returns the numbers of the phases at which episodes of `task` begin; `None` for its own beginning.
+    /// Returns the numbers of the phases at which episodes of `task` begin; `None` for the start of the task.
     fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
         match &self.starts {
             Starts::Task | Starts::Moments { .. } => vec![None],
@@ -276,7 +277,7 @@ impl EvaluationPlan<'_> {
     }
 }
 
-/// Largest number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
+/// Maximum number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
 /// export`.
 const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
 

@@ -23,7 +23,7 @@ const PRESENCE_FILE: &str = "run.lock";
 /// The file that is locked while the identity is read and written.
 const IDENTITY_LOCK_FILE: &str = "run.json.lock";
 
-/// Largest number of attempts at a lock that others hold for a moment.
+/// Maximum number of attempts at a lock that others hold for a moment.
 const MAX_ATTEMPTS: u32 = 40;
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 

@@ -172,7 +172,7 @@ fn phases_begin_in_the_demonstrations_for_training() {
         std::fs::create_dir_all(&recording).unwrap();
         std::fs::write(recording.join("episode.mcap"), "").unwrap();
     };
-    // One of Pouring's has failed, and was not kept; Handover has two.
+    // One episode of Pouring has failed and was not kept. Handover has two episodes.
     (2000..2061).filter(|seed| *seed != 2003).for_each(|seed| demonstrate(format!("pouring-{seed}")));
     ["handover-7", "handover-11", "pouring-x"].into_iter().for_each(|name| demonstrate(name.into()));
     std::fs::create_dir_all(folder.path().join("episodes/handover-3")).unwrap();
@@ -298,7 +298,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     assert_eq!(collector.load(&spec), Some(same));
 }
 
-/// A policy that plays nothing.
+/// A policy that plays no episode.
 #[derive(Debug)]
 struct Unplayable(fn() -> PlayError);
 

@@ -52,7 +52,8 @@ pub fn play_all(
         played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
     if let Some(error) = lock(&failure).take() {
-        // Count what the next run will find, including earlier episodes that were not reached.
+        // The count is of the episodes that the next run will find, including earlier episodes that were not
+        // reached.
         let kept = work.iter().filter(|spec| cache.load(spec).is_some()).count();
         return Err(error.after(kept, work.len()));
     }

@@ -35,8 +35,8 @@ pub trait Policy: Debug + Send + Sync {
     }
 }
 
-/// A remote policy that can drive one robot of an episode. It plays all robots, and its own does its
-/// part.
+/// A remote policy that can drive one robot of an episode. It computes commands for all robots, and only
+/// those of its own robot are executed.
 pub trait PartnerPolicy: Debug + Send + Sync {
     /// Returns the name by which people choose it and recordings name it.
     fn name(&self) -> String;
@@ -106,7 +106,7 @@ pub struct PlayOutcome {
 pub enum PlayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// The policy was not ready, and nothing was played; a later attempt may succeed.
+    /// The policy was not ready, and no episode was played. A later attempt may succeed.
     #[error("{0}")]
     NotReady(String),
     /// No policy is there that could play this episode, or any other.

@@ -1,5 +1,5 @@
-//! Replay of a demonstration's action rows in episodes of other seeds, without observations. Its results
-//! need no perception, and a policy that gets no farther has shown none.
+//! Replay of a demonstration's action rows in episodes of other seeds, without observations. It needs no
+//! perception. A policy that does not reach more phases has not shown any perception.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ use crate::results::{EPISODES, OPEN_LOOP, PolicyCard};
 /// Number of demonstrations per task: the second serves the seed of the first.
 const PER_TASK: usize = 2;
 
-/// A policy that sends the rows of recorded demonstrations to their end, and then repeats the last row
-/// until nothing can change any more.
+/// A policy that sends all rows of recorded demonstrations, and then repeats the last row until the episode
+/// can no longer change.
 #[derive(Debug)]
 pub struct OpenLoop {
     demonstrations: Vec<RecordedRows>,
@@ -78,7 +78,7 @@ impl OpenLoop {
                 }
                 chosen.push(RecordedRows::read(&path)?);
             }
-            // Failed recordings come last, in case there is nothing better.
+            // Failed recordings come last; they are used only without successful ones.
             chosen.sort_by_key(|(_, succeeded)| !succeeded);
             demonstrations.extend(chosen.into_iter().take(PER_TASK).map(|(rows, _)| rows));
         }

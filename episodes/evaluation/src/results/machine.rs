@@ -1,4 +1,4 @@
-//! The machine on which something was played or measured.
+//! The machine on which an episode was played or a value measured.
 
 use std::{env::consts, fs, thread::available_parallelism};
 

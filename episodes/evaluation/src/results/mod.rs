@@ -31,7 +31,7 @@ pub const EPISODES: &str = "episodes";
 /// Folder of the evaluations under stress in the folder of an evaluation.
 pub const STRESS: &str = "stress";
 
-/// One played episode, as stored in a file of its own.
+/// One played episode, as stored in its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlayedEpisode {
     /// The policy.
@@ -47,7 +47,8 @@ pub struct PlayedEpisode {
     /// The policy's thinking time.
     #[serde(default)]
     pub thought_s: f64,
-    /// Reason why the episode fell short: what stopped the policy, or the first missed phase.
+    /// Reason why the episode did not succeed: the failure that stopped the policy, or the first missed
+    /// phase.
     pub note: Option<String>,
     /// True if a failure of the policy itself counts as a failed episode, because the episode has been
     /// retried as often as requested.
@@ -56,8 +57,8 @@ pub struct PlayedEpisode {
     /// Earlier attempts at this episode, which did not count; the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attempts: Vec<Attempt>,
-    /// Time at which it ended, in UTC; of a served episode, that of its file. `None` in results of earlier
-    /// builds.
+    /// Time in UTC at which the episode ended; of a served episode, the time of its file. `None` in results
+    /// of earlier builds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended_at: Option<String>,
 }
@@ -76,8 +77,8 @@ pub struct Attempt {
     pub usage: Option<Usage>,
 }
 
-/// Reason why an episode says nothing about its policy's performance. It is listed apart from failures, and
-/// played again by the next run.
+/// Reason why an episode is no evidence of its policy's performance. It is listed separately from failures,
+/// and the next run plays it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exclusion {

@@ -1,5 +1,6 @@
-//! Phase-level rates: how often each phase was reached by episodes that began at it. Earlier failures in a
-//! task have no effect on them, so phases that need several robots can be compared with those that do not.
+//! Phase-level rates: how often each phase was reached by episodes that began at that phase. They do not
+//! depend on earlier failures in a task, so phases that need several robots can be compared with the other
+//! phases.
 
 use std::collections::BTreeMap;
 

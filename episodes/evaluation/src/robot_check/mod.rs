@@ -1,4 +1,5 @@
-//! The first look at a robot's file: what it can do, and whether it stands; and drafts of descriptions.
+//! A first check of a robot's file: its parts, and whether it stands for a second; and drafts of
+//! descriptions.
 
 mod stand;
 
@@ -14,14 +15,14 @@ use stand::stand;
 pub struct RobotCheck {
     /// Parts that it lacks, with the consequences.
     pub lacks: Vec<String>,
-    /// Reason for which it does not stand for a second; `None` if it does.
+    /// Reason why the robot does not stand for a second; `None` if it does.
     pub falls: Option<String>,
 }
 
-/// Distance that a standing robot's pelvis moves in a second at most, on a G1.
+/// Maximum displacement of a standing G1's pelvis in one second.
 const MAX_MOVED_M: f32 = 0.1;
 
-/// Looks at a robot, and lets it stand for a second.
+/// Checks a robot, and lets it stand for a second.
 ///
 /// # Errors
 ///

@@ -1,6 +1,6 @@
-//! Trial of a task before anyone plays it: its world is built and runs for some seconds without any action.
-//! The check names everything that falls and every phase that is reached, and renders the first image of
-//! each camera.
+//! Trial of a task before anyone plays it. The task's world is built and runs for some seconds without any
+//! action. The check lists all objects that fall and all phases that are reached, and renders the first image
+//! of each camera.
 
 use std::path::{Path, PathBuf};
 
@@ -96,7 +96,7 @@ impl Falls {
         };
         self.0.into_iter().map(line).collect()
     }
-    /// Finds everything that has not stayed where it was put.
+    /// Finds all objects that have moved from their places.
     fn find(
         &mut self,
         task: &Task,
@@ -191,7 +191,8 @@ impl TaskCheck {
         Ok(())
     }
 
-    /// Notes the seed's choices that a robot's operator reads although its own instruction holds them back.
+    /// Notes the seed's choices that a robot's operator can read, although its own instruction does not
+    /// contain them.
     fn note_secrets(&mut self, task: &Task) {
         let ways = task.variants();
         let chosen =
@@ -274,7 +275,7 @@ impl TaskCheck {
     }
 }
 
-/// Returns `true` if a phase would be reached at once, were it next.
+/// Returns `true` if a phase would be reached immediately, were it next.
 fn holds(done: &Done, facts: &Facts) -> bool {
     match done {
         Done::When(condition) => condition.holds(facts),

@@ -1,4 +1,4 @@
-//! Tasks that stand, that fall, and that are complete without any action.
+//! Tests of checked tasks: objects at rest, objects that fall, and phases that need no action.
 
 use tandem_episodes::tasks::{TaskSource, task_of};
 

@@ -1,4 +1,4 @@
-//! `send_joint_drives`: setpoints of every motor for each control step, in place of the base controller and
+//! `send_joint_drives`: setpoints of every motor for each control step. They replace the base controller and
 //! the simulator's drives.
 
 use tandem_sim::{JOINTS, MotorSetpoints};

@@ -17,7 +17,8 @@ use super::columns::{self, Clamped};
 use super::motion::{Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
-/// Maximum distance from its limit of a measured joint that rests at it.
+/// Maximum distance between a joint's measured angle and its limit at which the joint counts as resting at
+/// the limit.
 const AT_LIMIT_RAD: f32 = 0.01;
 /// Joint speeds above which an arm or a finger is moving.
 const ARM_MOVES_RAD_S: f32 = 0.05;
@@ -27,7 +28,7 @@ const PUSHED_AWAY_M: f64 = 0.03;
 const PUSHED_AWAY_RAD: f64 = 0.15;
 /// Factor on the arrival tolerance for a hand that presses on an object from two sides.
 const HOLDING_FACTOR: f64 = 3.0;
-/// Force at which a blocked hand touches something.
+/// Minimum force at which a blocked hand counts as touching an object.
 const TOUCHED_N: f32 = 3.0;
 /// Tolerance within which free fingers reach their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
@@ -37,9 +38,9 @@ pub fn grip(side: Side, sensed: &RobotSensed, motion: &Motion) -> Grip {
     feel::felt(side, sensed, &motion.robot.model).grip
 }
 
-/// Returns the report on an order. `clamped` are its clamped values, `sensed` is the robot's sensing after
-/// it, and `began` is the pelvis before it by odometry. Wrist poses are in the frame of the latest wrist
-/// targets.
+/// Returns the report on an order. `clamped` are its clamped values, `sensed` are the robot's readings after
+/// the order, and `began` is the pelvis before the order by odometry. Wrist poses are in the frame of the
+/// latest wrist targets.
 pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Motion) -> RobotReport {
     let (robot, frame) = (&motion.robot, motion.state().frame);
     RobotReport {
@@ -117,7 +118,7 @@ fn hand_report(
             robot,
             among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
         ),
-        // A finger of an open hand is always at a limit, which says nothing about reach.
+        // A finger of an open hand is always at a limit, which is no information about reach.
         joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, sensed))),
     }
 }
@@ -145,7 +146,7 @@ fn pelvis_in_room(frame: PoseFrame, motion: &Motion) -> Option<WirePose> {
     (frame == PoseFrame::Room).then(|| coarse_pose(&motion.pelvis_from(frame).inverse()))
 }
 
-/// Converts the wrists of a report on the robot as it is now to `frame`.
+/// Converts the wrists of a report on the robot's present state to `frame`.
 pub fn report_wrists_in(frame: PoseFrame, report: &mut RobotReport, sensed: &RobotSensed, motion: &Motion) {
     report.frame = Some(frame).filter(|frame| *frame != PoseFrame::Pelvis);
     report.pelvis_in_room = pelvis_in_room(frame, motion);

@@ -28,7 +28,7 @@ const MIN_PIXELS: usize = 12;
 /// Saturation and value below which a colour is grey or black, and value above which it is white.
 const GREY_SATURATION: f32 = 0.25;
 const BLACK_VALUE: f32 = 0.2;
-/// Saturation below which an orange is the brown of wood and cardboard, in whatever light.
+/// Minimum saturation of orange. Below it, the colour is the brown of wood and cardboard, in any light.
 const BROWN_SATURATION: f32 = 0.72;
 const WHITE_VALUE: f32 = 0.75;
 
@@ -45,7 +45,7 @@ pub struct CameraPoses {
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Returns the surfaces of these things, each with its ids, that pixels see, with their places in the list.
+/// Returns the visible surfaces of these objects, each given by its ids, with its index in the list.
 pub fn of_things(view: &RobotView, things: &[BTreeSet<u32>], poses: &CameraPoses) -> Vec<(usize, Surface)> {
     let relief = Relief::of(view);
     let surface = |(index, ids): (usize, &BTreeSet<u32>)| {
@@ -409,8 +409,8 @@ mod tests {
         assert_eq!(found(None, Some(Color::Blue)), []);
     }
 
-    /// The spot has one colour, and the wall continues around it; the square in front of the wall is an
-    /// object of its own.
+    /// The spot has one colour, and the wall continues around it. The square in front of the wall is a
+    /// separate object.
     #[test]
     fn a_pixel_tells_of_its_colour_and_of_the_whole_thing() {
         let told = |at: [i64; 2]| -> Vec<(JoinedBy, u32)> {
@@ -447,7 +447,8 @@ mod tests {
         assert_eq!(told(&view), [221, 36, (9 * WIDTH + 4 * 20) as u32], "{carpet:?}");
     }
 
-    /// A box with a band around its middle shows two red regions; the spot on the wall is none of its parts.
+    /// A box with a band around its middle shows two red regions; the spot on the wall is not a part of the
+    /// box.
     #[test]
     fn regions_of_one_thing_are_one_surface() {
         let mut view = view();

@@ -68,8 +68,8 @@ impl Relief {
         grow(view, seed, &mut vec![false; view.depth_m.len()], &|one, other| self.are_of_one(one, other))
     }
 
-    /// Unites the regions of one colour that belong to one object, for example a bottle's two rings. What is
-    /// larger than `max_pixels` is part of the room, and unites nothing.
+    /// Unites the regions of one colour that belong to one object, for example a bottle's two rings. A region
+    /// larger than `max_pixels` is part of the room, and is not united with others.
     pub fn unite(&self, view: &RobotView, regions: Vec<Vec<usize>>, max_pixels: usize) -> Vec<Vec<usize>> {
         let mut left = regions;
         left.sort_by_key(|region| region.len());

@@ -1,4 +1,4 @@
-//! Texts that the page has to show, and to leave out.
+//! Texts that the page has to show, and texts that it has to leave out.
 
 use tandem_tools_spec::{Assistance, Note, PhaseTimes, Protocol};
 

@@ -14,8 +14,8 @@ use crate::scoring::{A, B};
 
 const PUSH_M_S: f32 = 0.24;
 const WALK_M_S: f32 = 0.35;
-/// Distance from the mark within which the trolley has to come before B takes the bottle. It must also be
-/// slower than `STANDS_M_S`.
+/// Maximum distance of the trolley from the mark before B takes the bottle. The trolley must also be slower
+/// than `STANDS_M_S`.
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
 /// Number of commands that A waits at most for the trolley to stand.
@@ -95,7 +95,7 @@ fn serve(commander: &mut Commander) -> Result<(), PlayerError> {
     commander.perform(1.0, &[grasp.open()])
 }
 
-/// Holds B still until the trolley has come to the mark and stands.
+/// Holds B still until the trolley stands at the mark.
 fn await_trolley(commander: &mut Commander) -> Result<(), PlayerError> {
     let mut came = false;
     loop {

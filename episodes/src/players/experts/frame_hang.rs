@@ -25,8 +25,8 @@ const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
 const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);
 const LEG_S: f32 = 0.3;
-/// Number of attempts. A frame that missed the peg, or leans by more than `ASKEW_RAD` on it, is taken off
-/// and hung again.
+/// Number of attempts. A frame that missed the peg, or is tilted by more than `ASKEW_RAD`, is taken off and
+/// hung again.
 const TRIES: u32 = 3;
 const ASKEW_RAD: f32 = 0.2;
 /// Closure of fingers that open as far as the wall behind the frame lets them. The hands then move outwards
@@ -35,7 +35,7 @@ const LOOSE: f32 = 0.35;
 const OUTWARDS_M: f32 = 0.13;
 const BACK_M: f32 = 0.14;
 
-/// Hangs the frame. A frame that both robots already hold is not grasped again, and one whose loop is over
+/// Hangs the frame. A frame that both robots already hold is not grasped again. A frame whose loop is over
 /// the peg is only lowered.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasp = |robot, side, place| HandGrasp {
@@ -79,7 +79,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
             }
             give_way(commander, false);
         }
-        // Take it off the way it came, and try once more with the grips as they are now.
+        // Takes the frame off the way it came, and tries once more with the present grips.
         let missed = commander.facts()?.object("frame").pose_in_world;
         let above_m = Vector::new(missed.translation.x, missed.translation.y, past.translation.z);
         let above = Pose::from_translation(above_m);

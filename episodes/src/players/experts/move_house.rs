@@ -19,8 +19,8 @@ const LIFT_M: f32 = 0.07;
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.27;
-/// Distance, in a fist with its palm down, from the wrist to the part that presses; `FRONT_M` is that to
-/// the fist's front.
+/// Distance from the wrist to the part that presses, in a fist with its palm down. `FRONT_M` is the distance
+/// to the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
 /// Distance behind the lever at which the fist closes. The wrist then rises `ABOVE_LEVER_M` over the
@@ -55,7 +55,7 @@ const BESIDE_Y_M: f32 = -0.75;
 const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
 /// Position of A beside its partners' way, door frame.
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
-/// Largest speed of A on its way to the lever, and to its place aside.
+/// Maximum speed of A on its way to the lever, and to its place aside.
 const APPROACH_M_S: f32 = 0.4;
 const WALK_M_S: f32 = 0.3;
 
@@ -81,7 +81,7 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     set_heights(commander, BENT_M);
-    // A walking robot's thighs meet the legs if the robot is off the middle behind them or too near.
+    // A walking robot's thighs hit the table's legs if the robot is too near or not centred behind them.
     team.gather_reaching(commander)?;
     grasp_reached(commander, &grasps)?;
     // Two robots that lift with stiff hands lean back against each other's pull, and stagger.

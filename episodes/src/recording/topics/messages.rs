@@ -19,7 +19,7 @@ use crate::scoring::{Facts, Grip};
 /// A message written as JSON.
 pub struct Json<T>(pub T);
 
-/// A type that has a schema of its own in the recording.
+/// A type that has a schema in the recording.
 pub trait JsonMessage: Serialize + JsonSchema {
     const SCHEMA_NAME: &str;
 }
@@ -51,7 +51,7 @@ pub fn state_hash_text(state_hash: u64) -> String {
 #[derive(Deserialize)]
 pub struct StepMessage {
     control_step: u64,
-    /// Hash of everything that determines the future, which is more than the step shows; 16 hexadecimal
+    /// Hash of the whole state that determines the future, which is more than the step shows; 16 hexadecimal
     /// digits.
     state_hash: String,
     /// [`Step`] in postcard's encoding, base64.
@@ -312,7 +312,7 @@ impl<'a> CallerRecord<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct CallMoment {
     pub time_s: f64,
-    /// Number of control steps before it.
+    /// Number of control steps before the call.
     pub control_step: u64,
     /// The policy's thinking time since the episode began.
     pub thought: Duration,
@@ -324,10 +324,10 @@ impl CallMoment {
     }
 }
 
-/// Longest recorded arguments of a call that was refused before it reached the episode: a caller may send
-/// anything.
+/// Maximum length of the recorded arguments of a call that was refused before it reached the episode. A
+/// caller may send anything.
 const MAX_UNREAD_BYTES: usize = 10_000;
-/// Longest recorded name of a tool that may not exist.
+/// Maximum length of the recorded name of a tool that may not exist.
 const MAX_NAME_BYTES: usize = 100;
 
 /// Returns the beginning of a text that is too long; `None` if it is short enough.
@@ -336,8 +336,7 @@ fn beginning(text: &str, most_bytes: usize) -> Option<&str> {
     Some(&text[..cut])
 }
 
-/// A tool call as it is recorded: the call with its reply, and the reply's images, which have topics of
-/// their own.
+/// A recorded tool call: the call with its reply, and the reply's images, which have their own topics.
 pub struct ToolCallRecord {
     /// Simulated time of the reply.
     pub time_s: f64,
@@ -375,8 +374,8 @@ impl ToolCallRecord {
         Ok(ToolCallRecord { time_s: at.time_s, message, pictures })
     }
 
-    /// Creates the record of something that is no call of the episode: a plan, or a call that was refused
-    /// before it arrived, with its raw arguments.
+    /// Creates the record of a request that is no call of the episode, with its raw arguments: a plan, or a
+    /// call that was refused before it reached the episode.
     pub fn beside(
         at: CallMoment,
         caller: CallerRecord,

@@ -67,7 +67,7 @@ fn add(entity: &mut SceneEntity, geom: &Geom, color: Color) {
             entity.cubes.push(cube(below, Vector::new(x, y, PLANE_THICKNESS_M / 2.0), color));
         }
         Primitive::Convex { vertices_m } => {
-            // A degenerate mesh has no hull and nothing to show.
+            // A degenerate mesh has no hull, so it is not shown.
             if let Ok((points_m, corners)) = try_convex_hull(vertices_m) {
                 entity.triangles.push(triangles(pose, &points_m, &corners, color));
             }

@@ -151,7 +151,7 @@ impl StepDecoder {
         step.map(|step| self.with_cameras_before(step))
     }
 
-    /// Completes a step with what the step before has.
+    /// Completes a step with parts of the step before.
     fn with_cameras_before(&mut self, mut step: Step) -> Step {
         let poses = step.robots.iter().map(|robot| robot.truth.world_from_camera).collect();
         let before = self.cameras.replace((step.control_step, poses));
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!([0, 1, 1u32.wrapping_neg()].map(zigzag), [0, 2, 1]);
     }
 
-    /// Returns steps of a world at rest, with varied numbers and varied counts of them.
+    /// Returns steps of a world at rest. Their numbers and their counts of numbers vary.
     fn steps() -> Vec<Step> {
         let spec = crate::EpisodeSpec::new(
             &crate::tasks::find("pouring").unwrap(),

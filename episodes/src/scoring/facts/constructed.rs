@@ -8,7 +8,7 @@ use super::*;
 use crate::spec::RobotFile;
 use crate::tasks::{self, RobotSpot, Task};
 
-/// Model of the robots in all of them.
+/// Model of all robots.
 static ROBOT: LazyLock<Arc<RobotModel>> = LazyLock::new(|| RobotFile::default().model().unwrap());
 
 impl Facts {

@@ -32,7 +32,7 @@ pub struct Phase {
     pub id: String,
     /// Description of when the phase counts as reached, for people and policies.
     pub description: String,
-    /// True if more than one robot has to work on it.
+    /// True if the phase needs more than one robot.
     pub collaborative: bool,
     pub done: Done,
     /// Nearness of the phase, from 0 to 1, once its predecessors have been reached. It is used for dense
@@ -63,7 +63,7 @@ pub enum Done {
 #[derive(Clone)]
 pub struct Milestone {
     pub condition: Condition,
-    /// Duration for which it has to hold without a break.
+    /// Duration for which the condition has to hold without interruption.
     pub for_s: f64,
 }
 

@@ -94,7 +94,7 @@ fn a_lasting_condition_needs_its_whole_time_without_a_break() {
         (&[(OUT, 1), (IN, 26)], 3),
         (&[(OUT, 1), (IN, 25), (OUT, 1), (IN, 25)], 2),
         (&[(OUT, 1), (IN, 25), (OUT, 1), (IN, 26)], 3),
-        // The glass has to be aloft when the time is over, not before.
+        // The glass has to be in the air at the end of the time, not before.
         (&[(OUT, 1), (LOW, 60)], 2),
         (&[(OUT, 1), (LOW, 60), (IN, 1)], 3),
     ] {

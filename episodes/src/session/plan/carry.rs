@@ -1,12 +1,11 @@
 //! `walk_to` for robots that push or carry: bases and hands follow one path from rest to rest, each
 //! robot's in its own start frame.
 //!
-//! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid
-//! body. Robots that hold one load, with places that fit it, thus move as one body with it, without
-//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place,
-//! which are those of the first step. So an error of the base does not carry over to the next leg.
-//! Robots walk half a second behind their commands, so base commands are ahead of the planned places by
-//! that time.
+//! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid body.
+//! Robots that hold one load, with places that fit it, thus move as one body with the load. They need no
+//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place, which
+//! are those of the first step. So an error of the base does not carry over to the next leg. Robots walk half
+//! a second behind their commands, so base commands are ahead of the planned places by that time.
 
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
@@ -38,7 +37,8 @@ const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
 /// Compliance of hands that carry with partners.
 const COMPLIANCE_N_S_M: f64 = 250.0;
-/// Number of commands at the end of the path for corrections, and maximum number after them until rest.
+/// Number of commands for corrections at the end of the path, and maximum number of further commands until
+/// rest.
 const CORRECTING_COMMANDS: u32 = 4;
 const RESTING_COMMANDS: u32 = 12;
 /// Number of commands without a hold after which a hand has lost its object.

@@ -143,7 +143,7 @@ impl CommandList {
         }
     }
 
-    /// Returns the number of commands that have been begun, however many short ones each is made of.
+    /// Returns the number of commands that have been begun. The pieces of one command count once.
     pub fn begun(&self) -> u32 {
         self.begun as u32
     }
@@ -168,7 +168,7 @@ impl CommandList {
         self.last_begun().is_some_and(|step| step.short)
     }
 
-    /// Returns the frame of the places of the last command, if it walks to some.
+    /// Returns the frame of the last command's places, if the command walks to places.
     pub fn frame(&self) -> Option<PoseFrame> {
         match &self.last_begun()?.call {
             PlannedCall::WalkTo(walk) => Some(walk.frame),
@@ -176,7 +176,7 @@ impl CommandList {
         }
     }
 
-    /// Returns the frame of the places of the last command, if it carries a load to some.
+    /// Returns the frame of the last command's places, if the command carries a load to places.
     pub fn carried_in(&self) -> Option<PoseFrame> {
         match &self.last_begun()?.call {
             PlannedCall::WalkTo(walk) => walk.carries().then_some(walk.frame),

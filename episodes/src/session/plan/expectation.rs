@@ -19,15 +19,15 @@ pub struct PartnerNews {
 }
 
 impl PartnerNews {
-    /// Returns who has spoken, as a reason to end; `None` if nobody has.
+    /// Returns the operators that have sent a message, as a reason to end; `None` if there are none.
     pub fn words(&self) -> Option<String> {
         let speakers: Vec<&str> = self.heard.iter().map(String::as_str).collect();
         (!speakers.is_empty()).then(|| format!("{} has spoken", speakers.join(" and ")))
     }
 }
 
-/// Returns true if every partner lets time pass for the others: by `wait`, or because it has finished. One
-/// that has been silent for too long thinks.
+/// Returns true if every partner lets time pass for the others: by `wait`, or because it has finished. A
+/// partner that has been silent for too long counts as thinking.
 pub fn all_wait(partners: &[Partner]) -> bool {
     let waits = |partner: &Partner| match partner.did {
         PartnerDid::Acted => partner.tool.as_deref() == Some(Wait::NAME),
@@ -41,7 +41,8 @@ pub fn all_wait(partners: &[Partner]) -> bool {
 #[derive(Debug, Clone, Copy)]
 pub struct PlanMoment<'a> {
     pub news: &'a PartnerNews,
-    /// True once wrists have their last targets: one that has arrived before is only on its way.
+    /// True once wrists have their last targets. A wrist that arrives earlier has only reached an
+    /// intermediate one.
     pub is_way_done: bool,
     /// True once fingers have their last targets.
     pub are_fingers_done: bool,
@@ -67,7 +68,7 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMome
         .or_else(|| differs("blocked", expected.blocked, stopped.is_some(), stopped.map(off)))
         .or_else(|| differs("touching", expected.touching, touches.is_some(), touches.map(name)))
         .or_else(|| {
-            // What closing fingers hold may still slip out; what opening fingers hold is held.
+            // An object in closing fingers may still slip out; one in opening fingers is held.
             let is_held = holds.is_some() && (moment.are_fingers_done || expected.holding == Some(false));
             differs("holding", expected.holding, is_held, holds.map(name))
         })
@@ -83,7 +84,7 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMome
         .or_else(|| none_holds(expected.any_of.as_deref()?, reply, moment))
 }
 
-/// Returns what every one of the alternatives lacks; `None` if one of them holds.
+/// Returns the reasons why none of the alternatives holds; `None` if one of them holds.
 fn none_holds(any_of: &[Expectation], reply: &CommandReply, moment: PlanMoment) -> Option<String> {
     let lacks: Option<Vec<String>> = any_of.iter().map(|one| unexpected(one, reply, moment)).collect();
     lacks.map(|lacks| format!("none of any_of holds: {}", lacks.join("; ")))
@@ -148,7 +149,7 @@ mod tests {
         assert!(!all_wait(&[]), "there is nobody");
     }
 
-    /// Fingers that are stopped half-way hold a thing loosely, and it slips.
+    /// Fingers that are stopped half-way hold an object loosely, and it slips.
     #[test]
     fn closing_fingers_hold_once_they_are_done() {
         let reply: CommandReply = serde_json::from_value(serde_json::json!({

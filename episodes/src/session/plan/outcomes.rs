@@ -63,7 +63,7 @@ impl PlanOutcome {
         self.states = states.collect::<Vec<String>>().join("; ");
     }
 
-    /// Describes a robot; `None` if it stands where it was and no hand has a target or feels anything.
+    /// Describes a robot; `None` if it has not moved, and its hands have no target and feel no contact.
     fn state(&self, report: &RobotReport, is_under_way: impl Fn(&str, Side) -> bool) -> Option<String> {
         let hands = [(Side::Left, &report.left), (Side::Right, &report.right)];
         let hands = hands

@@ -4,7 +4,7 @@
 const PACE_M_S: f64 = 0.2;
 const ACCELERATION_M_S2: f64 = 0.2;
 const CREEP_M_S: f64 = 0.02;
-/// Number of commands by which robots walk behind their commands.
+/// Lag of walking robots behind their commands, in commands.
 const BEHIND_COMMANDS: usize = 2;
 
 /// Progress along a path, and its speed.
@@ -12,7 +12,7 @@ const BEHIND_COMMANDS: usize = 2;
 pub struct PathPace {
     /// Distance that bases have been commanded to go.
     pub gone_m: f64,
-    /// The same of the latest commands, the oldest first.
+    /// Those distances after each of the latest commands, the oldest first.
     latest_m: [f64; BEHIND_COMMANDS + 1],
     pub pace_m_s: f64,
     pub waited: u32,

@@ -8,9 +8,9 @@ use crate::EpisodeError;
 use crate::commands::{self, Command, columns, wrist_targets};
 use crate::session::Session;
 
-/// Control steps of a piece, after each of which the conditions are checked.
+/// Number of control steps of a piece. The conditions are checked after each piece.
 const PIECE_STEPS: u32 = 5;
-/// Control steps for wrists to arrive after their way.
+/// Additional control steps in which wrists reach the ends of their paths.
 const ARRIVING_STEPS: u32 = 25;
 
 /// A command in pieces.
@@ -88,7 +88,8 @@ impl Pieces {
         })
     }
 
-    /// Returns true once wrists have their last targets: until then, one that has arrived is only on its way.
+    /// Returns true once wrists have their last targets. A wrist that arrives earlier has only reached an
+    /// intermediate one.
     pub fn is_way_done(&self) -> bool {
         self.done >= self.steps || !matches!(self.kind, PieceKind::Wrists(_))
     }

@@ -24,8 +24,8 @@ const TURN_RAD_S: f64 = 0.4;
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;
-/// Number of walks without an approach after which a robot this close rests, and corrects its place from
-/// there: at low speeds the sway hides the rest of the way.
+/// Number of walks without progress after which a robot this close rests and then corrects its place. At low
+/// speeds the sway hides the remaining distance.
 const SLOW_WALKS: u32 = 4;
 const CLOSE_M: f64 = 0.15;
 const CLOSE_RAD: f64 = 0.3;
@@ -35,14 +35,14 @@ pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
 pub const WELL_M: f64 = 0.013;
 pub const WELL_RAD: f64 = 0.023;
-/// Maximum number of further attempts after the first rest, and the displacement up to which a robot that
-/// stands walks by one pulse: its stop is predictable, so that it need not be steered.
+/// Maximum number of further attempts after the first rest; and the maximum displacement for which a standing
+/// robot walks by one pulse. The end of a pulse is predictable and needs no steering.
 pub const ATTEMPTS: u32 = 5;
 const PULSE_M: f64 = 0.35;
 const PULSE_RAD: f64 = 0.5;
 /// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
-/// Minimum approach within this many walks; with less, the robot is blocked.
+/// Minimum decrease of the distance within this number of walks. A robot with a smaller one is blocked.
 const NEARER_M: f64 = 0.03;
 const PATIENCE_WALKS: u32 = 12;
 
@@ -52,7 +52,7 @@ enum WalkerStage {
     Walks,
     /// A short walk from its standing place to its goal.
     Corrects,
-    /// The rest of such a walk. Commands of other operators may cut its own short.
+    /// Remainder of such a walk. Commands of other operators may have shortened its own.
     Pulses {
         vx_m_s: f64,
         vy_m_s: f64,

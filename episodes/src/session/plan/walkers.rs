@@ -50,7 +50,7 @@ impl Walkers {
         }
     }
 
-    /// Ends the walk before its places. Robots that carry come to rest first, and their hands with them.
+    /// Ends the walk before its places. Robots that carry a load come to rest first, and so do their hands.
     pub fn end(&mut self, session: &Session, last: Option<&CommandReply>, why: String) -> PlanAdvance {
         match &mut self.way {
             WalkersWay::Free(_) => PlanAdvance::Done(Some(why)),
@@ -67,7 +67,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// A robot that the episode does not have, or words that end the walk where nobody can speak.
+    /// If the episode lacks a robot, or messages are to end a walk in an episode without messages.
     pub(super) fn walkers(&self, walk: &WalkTo, operator: Option<&str>) -> Result<Walkers, EpisodeError> {
         if walk.until_heard && operator.is_none() {
             let reason = "`until_heard` is for operators, each of whom has a robot".into();

@@ -10,7 +10,7 @@ use crate::convert::isometry_from_sim;
 /// moments half a cycle apart is free of the sway.
 pub const WALK_STEPS: u32 = 13;
 pub const WALK_S: f64 = WALK_STEPS as f64 / CONTROL_HZ;
-/// Length in metres that counts as much as a radian.
+/// Length in metres that counts like a radian.
 const M_PER_RAD: f64 = 0.5;
 /// Fraction of earlier misses that a correction adds, and its limit.
 const MISSED_PART: f64 = 0.5;
@@ -191,7 +191,7 @@ mod tests {
         assert!((straight.at(0.5).at_m - Vector2::new(0.5, 1.0)).norm() < 1e-9, "{straight:?}");
     }
 
-    /// A robot whose every correction ends 1.5 cm behind gets closer with each.
+    /// Every correction of this robot ends 1.5 cm behind its place. It still gets closer with each.
     #[test]
     fn short_walks_make_up_for_what_they_miss() {
         let mut corrections = Corrections::default();
@@ -224,7 +224,7 @@ mod tests {
             places.iter().map(|place| [place.at_m.x, place.at_m.y, place.heading_rad]).collect()
         };
         assert_eq!(told(Stand::START), [[0.5, 0.0, 0.2], [1.0, 0.0, 1.5], [1.0, 1.0, 1.5]]);
-        // A frame that faces left: what is ahead in it is to the left. The present heading stays as it is.
+        // This frame faces left, so places ahead in it are to the left. The present heading is not changed.
         let quarter_rad = std::f64::consts::FRAC_PI_2;
         let expected = [[2.0, 0.5, 0.2], [2.0, 1.0, 1.5 + quarter_rad], [1.0, 1.0, 1.5 + quarter_rad]];
         let found = told(stand(2.0, 0.0, quarter_rad));

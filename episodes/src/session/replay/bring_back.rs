@@ -1,4 +1,4 @@
-//! Restoration of an episode that another process, or this one, has put aside.
+//! Restoration of an episode that this process or another one has suspended.
 
 use std::time::Duration;
 

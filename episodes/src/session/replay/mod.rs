@@ -1,4 +1,4 @@
-//! Replay of a recorded episode: call by call, with the policy's clock as it was charged.
+//! Replay of a recorded episode, call by call. The policy's clock advances by the recorded thinking times.
 
 mod bring_back;
 mod set_clock;
@@ -99,7 +99,7 @@ impl Replay {
         }
     }
 
-    /// Returns the current result, and true if the episode has ended by itself.
+    /// Returns the current result, and true if the episode has ended without a request.
     pub fn result(&self) -> (ResultReply, bool) {
         (self.session.result(), self.session.ended.is_some())
     }

@@ -1,4 +1,4 @@
-//! A clock that is set during a replay, and runs by itself afterwards.
+//! A clock that is set during a replay, and runs normally afterwards.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};

@@ -8,7 +8,7 @@ use crate::convert::{coarse, isometry_to_sim};
 use crate::scoring::{Facts, ROBOT_NAMES};
 
 impl Session {
-    /// Returns what the hands of all robots hold, or those of an operator's robot, in `frame`.
+    /// Returns the objects in the hands of all robots, or in those of an operator's robot, in `frame`.
     pub(in crate::session) fn held(
         &self,
         facts: &Facts,

@@ -8,8 +8,8 @@ use crate::scoring::{Facts, Phase, PhaseMemory, Predicate};
 use crate::tasks::{PhaseCondition, PhaseSetting, Task, TaskDefinition};
 
 impl Session {
-    /// Returns the next phase, what it lacks and what hands hold, for the operator of a robot or for the policy
-    /// of all. `None` after the last phase, or if phases are not disclosed.
+    /// Returns the next phase, its missing conditions and the objects in hands, for the operator of a robot
+    /// or for the policy of all robots. `None` after the last phase, or if phases are not disclosed.
     pub(in crate::session) fn next_phase(&self, operator: Option<&str>) -> Option<NextPhase> {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;
@@ -27,8 +27,8 @@ impl Session {
     }
 }
 
-/// Returns the variants of a task that the instructions of an operator, or of the policy of all robots, do
-/// not tell from it.
+/// Returns the variants of a task that look the same to a reader. The reader has the instructions of an
+/// operator, or those of the policy of all robots.
 fn alike<'a>(task: &'a Task, operator: Option<&str>) -> Vec<&'a TaskDefinition> {
     let read = |variant: &TaskDefinition| match operator {
         None => vec![variant.instruction.clone()],
@@ -42,8 +42,8 @@ fn alike<'a>(task: &'a Task, operator: Option<&str>) -> Vec<&'a TaskDefinition> 
     task.variants().iter().filter(|variant| read(variant) == own).collect()
 }
 
-/// Returns what phase number `index` of a task lacks, one sentence each, for a reader who cannot tell the
-/// task from the variants `alike`.
+/// Returns the missing conditions of phase number `index` of a task, one sentence each. The reader cannot
+/// distinguish the task from the variants `alike`.
 fn lacks(
     task: &Task,
     alike: &[&TaskDefinition],
@@ -57,7 +57,7 @@ fn lacks(
         let (_, part) = &conditions[number].parts[place];
         others(number, place).iter().all(|other| other.is_some_and(|other| other.asks_the_same(part)))
     };
-    // Whether a condition has held in the past would reveal its withheld parts, too.
+    // The past state of a condition would reveal its withheld parts, too.
     let missing = |number: usize, has_held: bool| -> Vec<String> {
         let parts = conditions[number].parts.iter().enumerate();
         let sentences = parts.flat_map(|(place, (_, part))| match is_told(number, place) {
@@ -100,8 +100,8 @@ fn lacks(
     found
 }
 
-/// Returns what `variants` have in the place of a part of a condition. A condition of the same setting may have
-/// other parts in another variant.
+/// Returns the parts of `variants` that correspond to a part of a condition. A condition of the same setting
+/// may have other parts in another variant.
 fn others<'a>(
     variants: &[&'a TaskDefinition],
     phase: usize,
@@ -223,14 +223,14 @@ mod tests {
         assert!(held.ends_with("so far 0.20 s"), "{held}");
     }
 
-    /// Returns what a phase of a tandem+ task lacks at rest, for a reader of its instructions.
+    /// Returns the missing conditions of a phase of a tandem+ task at rest, for a reader of its instructions.
     fn at_rest(id: &str, seed: u32, phase: usize, operator: Option<&str>) -> Vec<String> {
         let task = TaskSet::default().find(id).unwrap().under(seed);
         let alike = alike(&task, operator);
         lacks(&task, &alike, phase, &PhaseMemory::default(), &Facts::at_rest(&task))
     }
 
-    /// Only A, and a policy of all robots, are told the pad for the bottle.
+    /// The pad for the bottle is known only to A and to a policy of all robots.
     #[test]
     fn what_the_seed_chooses_is_told_to_whose_instructions_name_it() {
         let kept_back = "within_box(\"bottle\", \"[red / yellow / blue]_pad\", 0.06): not told, since your \
@@ -254,7 +254,7 @@ mod tests {
         }
     }
 
-    /// The facts about an object would tell B whether it is the one that is wanted.
+    /// The facts about an object would reveal to B whether it is the wanted one.
     #[test]
     fn what_is_kept_back_depends_on_nothing_that_the_reader_can_change() {
         let told: Vec<_> = (0..6).map(|seed| at_rest("which_one", seed, 0, Some("B"))).collect();

@@ -1,5 +1,5 @@
-//! Information for a policy. What its assistance withholds is removed from every reply here and nowhere
-//! else. Information beyond the benchmark's own policies is counted by kind and by robot.
+//! Information for a policy. Information that its assistance withholds is removed from every reply here and
+//! nowhere else. Information beyond the benchmark's own policies is counted by kind and by robot.
 
 mod short;
 
@@ -35,20 +35,20 @@ impl ShownInformation {
         self.0.iter().map(|(what, robots)| (what.name().into(), robots.clone())).collect()
     }
 
-    /// Counts an observation that has shown all of `shown` for every robot in it.
+    /// Counts an observation that has shown everything in `shown` for each of its robots.
     pub fn count_each(&mut self, shown: &[ExtraInformation], seen: &TeamObservation) {
         for robot in &seen.robots {
             shown.iter().for_each(|what| self.count(*what, &robot.state.robot));
         }
     }
 
-    /// Counts a reply that has shown `what` of `robot`.
+    /// Counts a reply that has shown the information `what` about `robot`.
     fn count(&mut self, what: ExtraInformation, robot: &str) {
         *self.0.entry(what).or_default().entry(robot.into()).or_default() += 1;
     }
 
-    /// Counts the information in an answer from which everything withheld has been removed. An
-    /// observation is in the formats of its call.
+    /// Counts the information in an answer from which withheld data have been removed. An observation is in
+    /// the formats of its call.
     pub fn count_answer(&mut self, answer: &Answer, formats: &Formats, protocol: Protocol) {
         match answer {
             Answer::Observation(seen) => self.count_seen(seen, formats),
@@ -266,7 +266,7 @@ impl Session {
         called.allowed(|tool| self.check_told(tool))
     }
 
-    /// Refuses setpoints of motors where commands are executed otherwise than told.
+    /// Refuses setpoints of motors where the executed commands differ from the policy's.
     fn check_drives(&self, call: &ToolCall) -> Result<(), EpisodeError> {
         match call {
             ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {

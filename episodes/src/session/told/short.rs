@@ -1,4 +1,4 @@
-//! Short replies for language models: without everything that is as expected.
+//! Short replies for language models. They leave out all values that are as expected.
 
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{
@@ -96,7 +96,7 @@ fn shorten_budget(budget: &mut Budget) {
 /// Shortens the reply to a plan or a walk like [`shorten`].
 pub fn shorten_plan(reply: &mut PlanReply) {
     reply.tool_calls = None;
-    // The lines of a plan tell which robots have walked, and where to; a walk has none.
+    // The lines of a plan state the walks of robots and their ends; a single walk has no lines.
     let tells_pelvises = reply.outcomes.is_empty();
     shorten_report(&mut reply.last, reply.executed_steps, tells_pelvises);
 }
@@ -114,7 +114,7 @@ fn shorten_report(reply: &mut CommandReply, executed_steps: u32, tells_pelvises:
     reply.phases.retain(|phase| phase.time_s > began_s);
     shorten_budget(&mut reply.budget);
     reply.robots.iter_mut().for_each(|report| shorten_robot(report, tells_pelvises));
-    // A robot with nothing to tell stands where it stood.
+    // A robot without an entry in the report has not moved.
     reply.robots.retain(|report| *report != still(report));
 }
 
@@ -132,7 +132,7 @@ fn shorten_robot(report: &mut RobotReport, tells_pelvises: bool) {
     shorten_hand(right);
 }
 
-/// Returns the report on the same robot with hands that have no target and feel nothing.
+/// Returns the report on the same robot with hands that have no target and feel no contact.
 fn still(report: &RobotReport) -> RobotReport {
     let RobotReport { robot, frame, .. } = report;
     let hand = HandReport { state: Some(HandState::Idle), ..HandReport::default() };
@@ -140,7 +140,7 @@ fn still(report: &RobotReport) -> RobotReport {
     RobotReport { robot: robot.clone(), frame: *frame, left, right, ..RobotReport::default() }
 }
 
-/// Returns true for a base that stands as commanded, and has stood.
+/// Returns true for a base that stands as commanded, and did so throughout.
 fn stands(base: &BaseReport) -> bool {
     let BaseReport { state, pelvis_height_m: _, commanded_height_m, comes_to_rest_m, displaced_m, stepped } =
         base;
@@ -170,7 +170,7 @@ fn shorten_hand(hand: &mut HandReport) {
         (hand.position_error_m, hand.orientation_error_rad) = (None, None);
         hand.joints_at_limit.clear();
     }
-    // Fingers around a thing rest where it stops them, and all of them press.
+    // Fingers around an object rest where it stops them, and all of them press.
     if hand.grip == Some(Grip::TwoSided) {
         hand.presses.clear();
     }
@@ -220,7 +220,7 @@ mod tests {
         assert!(presses.get("largest_effort").is_none(), "{presses}");
         let blocked = left(hand("blocked", 9.0));
         assert_eq!((&blocked["position_error_m"], &blocked["target"]), (&json!(0.02), &json!(null)));
-        // Without a state that says that the hand is at its target, its pose is reported.
+        // The pose is reported unless the state says that the hand is at its target.
         let untold = left(HandReport { state: None, ..hand("idle", 0.0) });
         assert!(untold["measured"].is_object() && untold["position_error_m"].is_number(), "{untold}");
     }
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// A walk tells where the robot stands, and a plan does so in its lines.
+    /// A walk reports the robot's position, and a plan does so in its lines.
     #[test]
     fn plans_tell_the_phases_of_all_their_commands() {
         let plan = |executed_steps: u32, outcomes: &[&str]| {

@@ -20,7 +20,7 @@ use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, TaskDefinition, 
 const MAX_PHASES: usize = 12;
 /// Minimum distance between the robots' start positions: robots that start closer touch each other.
 const ROBOT_NAMES_APART_M: f64 = 0.35;
-/// Largest absolute value of a coordinate.
+/// Maximum absolute value of a coordinate.
 pub(super) const FARTHEST_M: f64 = 100.0;
 const DEFAULT_BENCHMARK_STEPS: u32 = 1000;
 /// The benchmark's budget under the agentic protocol.

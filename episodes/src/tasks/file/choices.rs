@@ -8,7 +8,7 @@ use super::reading::Reading;
 use super::table::ChoiceTable;
 use crate::tasks::ChosenOption;
 
-/// Maximum number of combinations, each of which becomes a task.
+/// Maximum number of combinations. Each combination becomes a task.
 const MAX_COMBINATIONS: usize = 64;
 
 /// A choice as the file declares it.

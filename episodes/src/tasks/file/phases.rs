@@ -14,10 +14,10 @@ use crate::tasks::{PhaseCondition, PhaseSetting};
 
 const EXAMPLE: &str =
     "give done = '...', or first = '...' and then = '...', or lasting = '...' and for_s, or milestones";
-/// Longest duration that a phase may require.
+/// Maximum duration that a phase may require.
 const LONGEST_S: f64 = 3600.0;
 
-/// Returns the phases with their conditions. Terms are read first; each may refer to those above it.
+/// Returns the phases with their conditions. Terms are read first. A term may refer to earlier terms.
 pub(super) fn phases(
     reading: &mut Reading,
     terms: BTreeMap<Spanned<String>, Spanned<String>>,

@@ -102,7 +102,7 @@ impl<'a> Reading<'a> {
 }
 
 /// Returns the byte offset of a text in the file, after its opening quotes. A text with escapes does not
-/// appear verbatim; for it, this is the offset of its quotes.
+/// appear verbatim; its offset is that of the quotes.
 pub(super) fn place_in_file(file: &str, text: &Spanned<String>) -> usize {
     let span = text.span();
     let written = file.get(span.clone()).and_then(|written| written.find(text.as_ref().as_str()));

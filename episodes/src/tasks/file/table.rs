@@ -22,7 +22,7 @@ pub struct TaskTable {
     pub shared_instruction: Option<Spanned<String>>,
     /// Rewordings for stress levels 1, 2 and 3.
     pub rewordings: Option<Spanned<Vec<RewordingTable>>>,
-    /// True for a task that needs closing hands whatever its conditions require.
+    /// True for a task that needs closing hands even if no condition requires them.
     #[serde(default)]
     pub needs_fingers: bool,
     /// Grips that the brief explains; every one of them if it is not given.
@@ -37,7 +37,7 @@ pub struct TaskTable {
     pub objects: Vec<ObjectTable>,
     #[serde(default)]
     pub randomize: Vec<OffsetTable>,
-    /// Named expressions; each may refer to those before it.
+    /// Named expressions. Each may refer to earlier ones.
     #[serde(default)]
     pub terms: BTreeMap<Spanned<String>, Spanned<String>>,
     pub phases: Spanned<Vec<PhaseTable>>,

@@ -1,4 +1,4 @@
-//! Both sides of every threshold of BigTable.
+//! Tests at both sides of every threshold of BigTable.
 
 use tandem_sim::Vector;
 

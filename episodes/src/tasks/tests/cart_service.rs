@@ -1,4 +1,4 @@
-//! Both sides of every threshold of CartService.
+//! Tests at both sides of every threshold of CartService.
 
 use tandem_sim::Side::{Left, Right};
 use tandem_sim::Vector;

@@ -1,4 +1,4 @@
-//! Both sides of every threshold of CoPouring.
+//! Tests at both sides of every threshold of CoPouring.
 
 use tandem_sim::Side::{Left, Right};
 use tandem_sim::Vector;

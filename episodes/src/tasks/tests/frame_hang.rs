@@ -1,4 +1,4 @@
-//! Both sides of every threshold of FrameHang.
+//! Tests at both sides of every threshold of FrameHang.
 
 use tandem_sim::Side::{Left, Right};
 use tandem_sim::{Pose, Rotation, Vector};

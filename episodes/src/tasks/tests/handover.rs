@@ -1,4 +1,4 @@
-//! Both sides of every threshold of Handover.
+//! Tests at both sides of every threshold of Handover.
 
 use tandem_sim::Side::{Left, Right};
 use tandem_sim::{Side, Vector};

@@ -1,4 +1,4 @@
-//! Both sides of every threshold of Pouring.
+//! Tests at both sides of every threshold of Pouring.
 
 use tandem_sim::{Side::Right, Vector};
 

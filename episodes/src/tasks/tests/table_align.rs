@@ -1,4 +1,4 @@
-//! Both sides of every threshold of TableAlign.
+//! Tests at both sides of every threshold of TableAlign.
 
 use std::f32::consts::FRAC_PI_2;
 

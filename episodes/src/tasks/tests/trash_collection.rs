@@ -1,4 +1,4 @@
-//! Both sides of every threshold of TrashCollection.
+//! Tests at both sides of every threshold of TrashCollection.
 
 use tandem_sim::Side::{Left, Right};
 use tandem_sim::Vector;

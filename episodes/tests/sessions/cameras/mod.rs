@@ -1,4 +1,4 @@
-//! Episodes seen through a D435i: everything that shows images or depth shows the camera's.
+//! Tests of episodes with a D435i: all images and depths are the camera's.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ fn turn(steps: u32) -> ToolCall {
     Walk { steps, robots: vec![entry] }.into()
 }
 
-/// A moving camera's images depend on the step before, which a recording has.
+/// A moving camera's images depend on the step before, which the recording contains.
 #[test]
 fn what_a_recording_draws_again_is_what_was_seen() {
     let folder = tempfile::tempdir().unwrap();
@@ -97,7 +97,8 @@ fn isometry(pose: &Pose) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(pose.position_m), rotation)
 }
 
-/// Points of depth are where things are, although the image is distorted, and the calibration says by how much.
+/// Points measured by depth agree with the objects' positions although the image is distorted. The
+/// calibration states the distortion.
 #[test]
 fn points_of_a_distorted_image_are_right_and_holes_have_none() {
     let [mut real, mut ideal] = [CameraModel::D435i, CameraModel::Ideal]
@@ -109,7 +110,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
         QueryDepth { region, pixels: None, ..QueryDepth::example() }
     };
     let measured = measure(&mut real, everywhere()).points;
-    // As OpenCV's projectPoints does it, of points in the camera's frame.
+    // This is the projection of OpenCV's projectPoints, for points in the camera's frame.
     let seen_at = |[x, y]: [f64; 2]| {
         let [k1, k2, p1, p2, _] = lens.coefficients;
         let rr = x * x + y * y;

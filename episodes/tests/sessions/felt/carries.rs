@@ -220,7 +220,7 @@ fn carry_in_three_legs(seed: u32, [one, other]: [&Trial; 2], (lift_m, leg_m): (f
     }
 }
 
-/// Legs neither lose the squeeze of the hands nor add to it.
+/// Walking legs neither decrease nor increase the squeeze of the hands.
 #[test]
 fn a_load_is_held_alike_after_each_of_three_legs() {
     let trial = |task, thing, object, robot, places, heading_rad| Trial {

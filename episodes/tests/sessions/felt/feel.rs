@@ -253,8 +253,8 @@ fn an_observation_is_told_in_the_frame_that_it_names() {
     assert!(pelvis["cameras"][0].get("camera_in_frame").is_none());
 }
 
-/// A target in the start frame stays in place while its robot walks and turns. A target in the level
-/// frame follows gravity and the robot's heading.
+/// A target in the start frame stays in place while its robot walks and turns. A target in the level frame
+/// depends on gravity and the robot's heading.
 #[test]
 fn targets_are_read_in_the_frame_that_they_name() {
     let mut session = handover(2011);

@@ -58,7 +58,8 @@ fn approach(session: &mut Session, beside_m: f64, fingers_rad: [f64; 7]) {
     move_hand(session, entry);
 }
 
-/// For three seconds thumb and fingers press without a hold: replies list what presses, and report no hold.
+/// For three seconds thumb and fingers press without a hold. Replies list the pressing parts, and report no
+/// hold.
 #[test]
 fn a_pinch_that_is_not_scored_is_told_as_no_hold() {
     let mut session =

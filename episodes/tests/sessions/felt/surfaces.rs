@@ -53,7 +53,7 @@ fn surfaces(session: &mut Session, query: Value) -> DepthReply {
     }
 }
 
-/// A pixel on a bottle on the counter yields the whole bottle, nothing else, and its axis.
+/// A pixel on a bottle on the counter yields the whole bottle, without other objects, and its axis.
 #[test]
 fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     let mut session = start("handover", 2011, Protocol::Agentic);
@@ -74,7 +74,7 @@ fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     assert!(whole.extent_m[0] < 0.09 && whole.extent_m[1] < 0.09, "nothing of the counter: {whole:?}");
 }
 
-/// One call tells of every object that is seen, each as a call by its name does.
+/// One call describes every visible object, each like a call by its name.
 #[test]
 fn all_objects_are_told_at_once() {
     let mut session = start("handover", 2011, Protocol::Agentic);

@@ -13,7 +13,7 @@ fn started(task: &str, seed: u32) -> Session {
     Session::start(&EpisodeSpec::new(&task, seed, Protocol::Benchmark), None).unwrap()
 }
 
-/// Moves a wrist of one robot with the fingers ahead. An episode that is over stays as it is.
+/// Moves a wrist of one robot with the fingers ahead. An episode that is over is not changed.
 fn reach(session: &mut Session, robot: &str, steps: u32, position_m: [f64; 3]) {
     let hold = WristMove::hold(robot);
     let robot = match robot {

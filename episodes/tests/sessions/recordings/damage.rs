@@ -56,7 +56,7 @@ fn content(recording: &Recording) -> (Vec<(u64, String)>, Vec<RecordedCall>) {
     (hashes, recording.tool_calls().unwrap())
 }
 
-/// Checks that the content recovered from `bytes` is a prefix of `original`, or that nothing is recovered.
+/// Checks that the content recovered from `bytes` is a prefix of `original`, or that the recovery fails.
 fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simulate: bool, what: &str) {
     let partial = folder.join("episode.mcap.partial");
     fs::write(&partial, bytes).unwrap();
@@ -89,7 +89,7 @@ fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simul
     assert!(fs::read(&partial).unwrap() == bytes, "{what}: what is recovered stays as it is");
 }
 
-/// Returns true if a file ends with a complete record, as after a kill; nothing indicates then that more
+/// Returns true if a file ends with a complete record, as after a kill. Such a file does not show that more
 /// was written.
 fn ends_behind_a_record(bytes: &[u8]) -> bool {
     let mut position = mcap::MAGIC.len();
@@ -164,7 +164,7 @@ fn no_cut_is_verified() {
         let bytes = fs::read(&path).unwrap();
         let original = Recording::read(&path).unwrap();
         let place = tempfile::tempdir().unwrap();
-        // A cut within the magic bytes leaves no recognisable MCAP file, and nothing to recover.
+        // A cut within the magic bytes leaves no recognisable MCAP file, so recovery fails.
         let in_the_mark = 0..mcap::MAGIC.len();
         let random = (0..CUTS / 3 + 1).map(|_| chance.below(bytes.len())).collect::<Vec<_>>();
         for (number, left) in in_the_mark.clone().chain(random).enumerate() {
@@ -249,7 +249,7 @@ fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
     assert!(read > FLIPS / 8, "most changes are within contents: {read}");
 }
 
-/// A kill leaves a copy of the file as it is at some moment.
+/// A kill leaves the state that the file has at some moment.
 #[test]
 fn a_process_that_is_killed_loses_at_most_25_steps() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Tests of stress: each axis changes its own quantity and nothing else, a higher level changes it more,
-//! and results are reproducible.
+//! Tests of stress: each axis changes only its own quantity, a higher level changes it more, and results are
+//! reproducible.
 
 use tandem_episodes::players::{self, InProcess};
 use tandem_episodes::replay::{Verdict, verify};

@@ -52,7 +52,7 @@ const PAPER: &[(&str, &str)] = &[
     ),
 ];
 
-/// Further fields that are present only at times.
+/// Further fields that only some replies have.
 const PAPER_AT_TIMES: &[(&str, &str)] = &[(
     "command",
     "robots.SIDE.joints_clamped robots.SIDE.joints_at_limit robots.waist_joints_clamped robots.waist_joints_at_limit \
@@ -89,7 +89,7 @@ const FULL: &[(&str, &str)] = &[
     ),
 ];
 
-/// Further fields under `full` that are present only at times.
+/// Further fields under `full` that only some replies have.
 const FULL_AT_TIMES: &[(&str, &str)] = &[
     (
         "command",

@@ -40,7 +40,7 @@ fn a_held_thing_is_told_by_its_place_in_the_robots_level_frame() {
     let [held] = &next.held[..] else { panic!("one hand holds the bottle: {next:?}") };
     assert_eq!((&*held.robot, &*held.hand, &*held.object), ("A", "right", "bottle"));
     assert!(held.axis[2] > 0.97 && (0.82..0.95).contains(&held.lowest_m), "{held:?}");
-    // A hand closes on what is 0.12 m along its fingers.
+    // A hand closes on an object 0.12 m along its fingers.
     let wrist_m = state(&mut episode.session, "A").right_wrist.position_m;
     let ahead_m = held.middle_m[0] - wrist_m[0];
     assert!((0.06..0.18).contains(&ahead_m), "{held:?}, wrist at {wrist_m:?}");

@@ -64,7 +64,7 @@ fn an_object_is_found_by_its_name() {
     assert_eq!(counted(&session, "object_pixels"), json!({ "A": 2, "B": 1 }));
 }
 
-/// A refusal also tells something: that the object is out of sight.
+/// A refusal also gives information: the object is out of sight.
 #[test]
 fn what_is_not_seen_has_no_surface() {
     let own = spec("handover", 2011, Protocol::Agentic).assisted(Assistance::Full);
@@ -97,7 +97,7 @@ fn an_object_is_all_of_its_parts() {
     assert!(0 < moving && moving < whole, "{moving} of {whole} pixels move");
 }
 
-/// The patch on the other shelf is an object of its own, 1.2 m from the basket.
+/// The patch on the other shelf is a separate object, 1.2 m from the basket.
 #[test]
 fn a_longer_name_is_another_object() {
     let own = spec("co_carry", 2011, Protocol::Agentic).assisted(Assistance::Full);

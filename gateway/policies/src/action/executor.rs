@@ -133,7 +133,7 @@ impl<'a> Executor<'a> {
         (0..steps).step_by(self.most_steps).map(command).collect()
     }
 
-    /// Returns commands for motors, each row of which is held until the next.
+    /// Returns commands for motors. Each row is held until the next.
     fn drive_commands(&self, chunks: &[RobotRows], spans: &[RowSpan]) -> Vec<PlannedCommand> {
         let rows: Vec<usize> =
             spans.iter().flat_map(|span| iter::repeat_n(span.row, span.steps as usize)).collect();

@@ -5,7 +5,7 @@ use tandem_episodes::{CONTROL_HZ, rows::between_rows};
 use super::ActionRow;
 use crate::map::Between;
 
-/// A row with the number of control steps in which robots move to it.
+/// A row with the number of control steps in which robots move to its targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowSpan {
     pub row: usize,

@@ -73,8 +73,8 @@ impl WristTarget {
     }
 }
 
-/// Returns the `move_wrists` entry for a robot whose pelvis is at `start_from_pelvis`. Of the hand
-/// columns, only those in `told_columns` are used.
+/// Returns the `move_wrists` entry for a robot whose pelvis is at `start_from_pelvis`. Only the hand columns
+/// in `told_columns` are used.
 pub fn wrist_move(
     robot: &str,
     told: &ActionRow,

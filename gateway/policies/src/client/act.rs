@@ -27,7 +27,7 @@ pub struct Act {
     url: String,
     key: Option<PolicyKey>,
     agent: Agent,
-    /// Time limit for finding the server; `None` once it has been found.
+    /// Time limit for finding the server; `None` after the server has been found.
     connect_within: Option<Duration>,
 }
 

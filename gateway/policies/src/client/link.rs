@@ -127,13 +127,14 @@ fn request(address: &PolicyAddress) -> Result<Request, Error> {
     Ok(request)
 }
 
-/// Returns the error for a server at `url` that accepts connections but sends nothing.
+/// Returns the error for a server at `url` that accepts connections but never answers.
 pub fn silent(url: &str, within: Duration) -> RemoteError {
     let reason = format!("it says nothing within {} s of the connection", within.as_secs_f64());
     RemoteError::Unreachable { url: url.into(), reason }
 }
 
-/// Returns the beginning of a page, of which `begun` came with its header. Waits briefly for the rest.
+/// Returns the beginning of a page. `begun` is the part that came with its header. Waits briefly for the
+/// remaining part.
 fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     if begun.is_empty()
         && let Ok(mut stream) = stream

@@ -1,4 +1,4 @@
-//! Validation of a map, with advice on what would be right.
+//! Validation of a map, with advice on correct values.
 
 use std::collections::BTreeSet;
 

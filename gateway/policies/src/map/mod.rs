@@ -55,7 +55,7 @@ pub struct PolicyMap {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scope {
-    /// Only the robot of the request.
+    /// The answer contains only the robot of the request.
     Local,
     /// All robots, under keys with their names.
     Global,
@@ -188,7 +188,7 @@ pub enum WristFrame {
 pub struct HistorySpan {
     /// Number of observations, including the present one.
     pub length: usize,
-    /// Number of rows executed between two of them.
+    /// Number of rows executed between two requests.
     #[serde(default = "one")]
     pub stride: usize,
     #[serde(default)]
@@ -315,7 +315,7 @@ impl PolicyMap {
     pub fn shown(&self) -> Vec<ExtraInformation> {
         let columns: Vec<usize> = self.state.values().flat_map(|names| joined(names)).collect();
         let mut shown = extra_columns(&columns);
-        // A policy that gives poses in the start frame needs the robot's pose in it.
+        // A policy that outputs poses in the start frame needs the robot's pose in that frame.
         if self.chunk.wrist_frame == WristFrame::Start && !shown.contains(&ExtraInformation::Odometry) {
             shown.push(ExtraInformation::Odometry);
         }

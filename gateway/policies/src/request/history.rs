@@ -16,7 +16,7 @@ pub struct ObservationHistory {
     /// Extra information in the observations that the benchmark's own policies do not get.
     shown: Vec<ExtraInformation>,
     episode: u32,
-    /// Latest observation, and the number of rows executed before it.
+    /// Latest observation, and the number of rows executed before.
     present: PolicyObservation,
     present_rows: usize,
     /// Earlier observations with their row numbers, oldest first.
@@ -78,8 +78,8 @@ impl ObservationHistory {
         past.filter(|rows| *rows > from).collect()
     }
 
-    /// Returns the observations for the policy, oldest first. The first one also fills the time before
-    /// it.
+    /// Returns the observations for the policy, oldest first. The first observation also stands in for the
+    /// time before it.
     pub fn shown(&self) -> Vec<&PolicyObservation> {
         let at = |back: usize| {
             let wanted = self.present_rows.saturating_sub(back * self.stride);

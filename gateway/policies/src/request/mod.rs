@@ -63,7 +63,7 @@ pub fn request(
             CameraName::ThirdPerson => {
                 let seen: Vec<&Picture> =
                     shown.iter().filter_map(|moment| moment.third_person.as_deref()).collect();
-                // Otherwise no image was taken.
+                // In all other cases no image was taken.
                 if !seen.is_empty() {
                     let seen = seen.into_iter().map(|picture| pixels(picture, image));
                     request.put(key, over_time(seen.collect(), map));
@@ -126,7 +126,7 @@ fn over_time(moments: Vec<Array>, map: &PolicyMap) -> RequestValue {
     match map.history.map(|history| history.form) {
         Some(HistoryForm::List) => RequestValue::List(moments.into_iter().map(with_leading_axes).collect()),
         Some(HistoryForm::Stack) => with_leading_axes(Array::stack(moments)),
-        // Only the present observation.
+        // The policy gets only the present observation.
         None => moments.into_iter().next_back().map_or(RequestValue::List(Vec::new()), with_leading_axes),
     }
 }

@@ -1,4 +1,4 @@
-//! Observation of one moment, as far as a policy may get it.
+//! Observation at one moment, limited to the data that a policy may get.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-"""A robot of a real episode behind topics that the test holds in its hands."""
+"""A robot of a real episode with topics that the test controls."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Topics:
 
 @pytest.fixture
 def access(tmp_path: Path) -> Iterator[Access]:
-    """The access of robot B, whose partner is not there."""
+    """The access of robot B, whose partner is absent."""
     with tandem.serve(runs=tmp_path) as server:
         body = {"task": "handover", "seed": 0, "operators": "per_robot", "patience_s": 0.05}
         started = tandem.Client(server.url).request("POST", "/v1/episodes", body)
@@ -49,7 +49,7 @@ def access(tmp_path: Path) -> Iterator[Access]:
 
 
 def turned(robot: Robot, link: Link, exchange: Exchange, steps: int) -> float:
-    """Makes control steps as the adapter does, and returns the angle of the waist."""
+    """Makes control steps like the adapter, and returns the angle of the waist."""
     for _ in range(steps):
         exchange.take()
         assert link.command(robot.commands.row(robot.latest.time_s))

@@ -226,7 +226,7 @@ def test_a_program_waits_until_the_mode_is_released() -> None:
 
 
 class Hands:
-    """A clock's hands, which the test turns."""
+    """Time of a clock that the test sets."""
 
     def __init__(self) -> None:
         self.now_s = 100.0

@@ -1,4 +1,4 @@
-"""Bytes of messages, against those that Unitree's own types serialize (`tests/peers/unitree/golden.py`)."""
+"""Bytes of messages, compared with those of Unitree's own types (`tests/peers/unitree/golden.py`)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def value(name: str) -> float:
 
 
 def golden_moment() -> Moment:
-    """The moment that the golden messages tell."""
+    """Time in the golden messages."""
     q = np.array([value(name) for name in joint_names()])
     return Moment(
         time_s=12.34,

@@ -1,4 +1,4 @@
-"""Rates and orientations, against differences."""
+"""Rates and orientations, compared with finite differences."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks a file. The program fails if something falls.
+/// Checks a file. The program fails if an object falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
     let own = tandem_episodes::task_list(

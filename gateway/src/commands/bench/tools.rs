@@ -62,7 +62,7 @@ pub struct WaitTimes {
     pub p50_ratio: f64,
 }
 
-/// Plays an episode on a server of its own and times its calls.
+/// Plays an episode on a separate server and measures the times of its calls.
 pub fn tools() -> Result<ToolsReport, Box<dyn Error>> {
     let runs = tempfile::tempdir()?;
     let flags = Layer {

@@ -50,7 +50,7 @@ pub struct PeopleFlags {
 }
 
 impl PeopleFlags {
-    /// Returns the number of people that are to drive, if any.
+    /// Returns the number of people who drive, if there are any.
     pub fn operators(&self) -> Option<u8> {
         self.operators
     }

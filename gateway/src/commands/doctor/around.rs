@@ -30,7 +30,7 @@ print(platform.python_version(), *found)";
 pub(super) const MIN_FREE_BYTES: u64 = 5_000_000_000;
 /// Lower limit for a correct clock: the beginning of 2026, when this program was written.
 pub(super) const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
-/// Difference between the clocks of a build machine and this one that is no mistake.
+/// Tolerated difference between the clocks of the build machine and this one.
 const MAX_DRIFT: Duration = Duration::from_secs(86_400);
 
 /// Hosts that clients on this machine use for a server on it.
@@ -38,7 +38,7 @@ const LOOPBACK: [&str; 2] = ["127.0.0.1", "localhost"];
 /// Variables that make clients ask a proxy. Many programs read them in lower case, too.
 const PROXIES: [&str; 3] = ["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"];
 
-/// Checks everything around the program. Episodes run without it, except for a correct date and free space.
+/// Checks the environment of the program. Episodes run without it, except for a correct date and free space.
 pub fn check(layer: &Layer) -> Findings {
     vec![
         (RendererKind::Gpu.name(), gpu(layer.renderer())),

@@ -94,8 +94,8 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     findings
 }
 
-/// Reports the approximations in a scene's file, and the tasks that can be played in it. A scene is made
-/// for a few tasks, so it is only wrong if there is none.
+/// Reports the approximations in a scene's file, and the tasks that can be played there. A scene is made for
+/// a few tasks, so only a scene without any task is an error.
 fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
     let approximations = match SceneFile::with_approximations(path) {
         Ok((_, approximations)) => approximations,

@@ -19,7 +19,7 @@ const TRIED_STEPS: u32 = 25;
 const MIN_REALTIME_FACTOR: f64 = 1.0;
 /// Maximum tick of a clock that can time calls.
 const COARSEST_TICK: Duration = Duration::from_millis(1);
-/// Minimum number of cores; with fewer, episodes wait for each other.
+/// Minimum number of cores. With fewer cores, episodes wait for each other.
 const MIN_CORES: usize = 2;
 
 /// Checks the machine with an episode that can be played, if there is one.

@@ -27,7 +27,7 @@ pub struct DoctorArgs {
 enum Finding {
     /// Success, with a description.
     Works(String),
-    /// A note on something that may be unintended.
+    /// A note on a setting that may be unintended.
     Note(String),
     /// A failure, with advice.
     Wrong(String),
@@ -110,8 +110,8 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     })
 }
 
-/// Builds the world of an episode. In a custom scene this includes a second without commands, if it was not
-/// tried before.
+/// Builds the world of an episode. In a custom scene this includes a second without commands, unless that has
+/// been tried before.
 fn trial(spec: &EpisodeSpec) -> Result<(), EpisodeError> {
     build_world(spec).map(drop)
 }

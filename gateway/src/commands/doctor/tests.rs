@@ -1,4 +1,4 @@
-//! Tests that settings which would not work are found, with advice on what would work.
+//! Tests of `doctor`: it finds settings that would not work, and advises on settings that would.
 
 use std::{
     fs,

@@ -1,4 +1,4 @@
-//! Costs of language models: the limit of a whole run, and what a run would cost.
+//! Costs of language models: the limit of a whole run, and the estimated cost of a run.
 
 use std::{
     error::Error,
@@ -63,7 +63,7 @@ impl SpendingLimit {
     ///
     /// # Errors
     ///
-    /// [`PlayError::Absent`] if the run might cost more than the limit by it.
+    /// [`PlayError::Absent`] if the costs of the run might then exceed the limit.
     fn begin(&self) -> Result<(), PlayError> {
         let mut spent = self.spent();
         let next_usd = spent.dearest_usd * f64::from(spent.under_way + 1);
@@ -115,8 +115,8 @@ impl Policy for SpendingLimit {
     }
 }
 
-/// Describes what `episodes` episodes would cost if each used as many tokens as those in `folder` did on
-/// average, at these prices.
+/// Describes the costs of `episodes` episodes at these prices, if each used as many tokens as those in
+/// `folder` did on average.
 ///
 /// # Errors
 ///
@@ -227,7 +227,7 @@ mod tests {
         spend(&run, 3.0);
         let refused = run.begin().unwrap_err().to_string();
         assert!(refused.contains("has cost 7.00") && refused.contains("--max-usd 10"), "{refused}");
-        // Episodes that are being played may cost as much as the dearest, too.
+        // Episodes that are being played may also cost as much as the most expensive one.
         let run = limit(10.0);
         spend(&run, 3.0);
         assert!(run.begin().is_ok() && run.begin().is_ok() && run.begin().is_err());

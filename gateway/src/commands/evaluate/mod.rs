@@ -136,7 +136,7 @@ impl FromStr for ShardFlag {
     }
 }
 
-/// Plays and counts. The program fails if there are episodes to play and none of them counts.
+/// Plays and counts. The program fails if there are episodes to play, but none that counts.
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let ShardFlag(shard) = args.shard;
@@ -206,7 +206,7 @@ fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
     }
 }
 
-/// Refuses two different rewordings of tasks at once.
+/// Refuses the combination of two different rewordings of tasks.
 pub fn check_words(
     plan: &EvaluationPlan,
     stresses: impl IntoIterator<Item = Stress>,

@@ -112,7 +112,7 @@ impl Tally {
         self.kept + self.played + self.left_out
     }
 
-    /// Estimates the remaining time from the pace of this run; `None` before it has played anything.
+    /// Estimates the remaining time from the pace of this run; `None` before its first episode.
     fn left(&self, elapsed: Duration) -> Option<Duration> {
         let left = self.planned.saturating_sub(self.done()) as f64;
         (self.played > 0).then(|| elapsed.mul_f64(left / self.played as f64))

@@ -6,7 +6,7 @@ use std::iter;
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
 
-/// Part of a program's time limit after which a model finishes by itself, in twelfths.
+/// Part of a program's time limit after which a model finishes without being stopped, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
 
 /// Flags whose values are strings, even if they look like numbers.

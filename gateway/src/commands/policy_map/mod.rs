@@ -32,7 +32,7 @@ enum MapAction {
     },
 }
 
-/// Prints a map or the report on one. The program fails if a map cannot be followed.
+/// Prints a map or its report. The program fails if a map cannot be used.
 pub fn run(args: PolicyMapArgs) -> CommandResult {
     match args.action {
         MapAction::Show { name } => print(preset(&name).unwrap_or_default())?,

@@ -57,7 +57,7 @@ fn without_break(held: &Held, for_s: f64) -> String {
     }
 }
 
-/// Describes when something held; `nearest` is added if it never did.
+/// Describes the times at which a condition held. If it never did, `nearest` is added.
 fn held_told(held: &Held, nearest: &str) -> String {
     match held.first_s {
         None => format!("never{nearest}"),

@@ -36,7 +36,7 @@ impl KeptOutput {
 
     /// Waits until all of it is written, for at most `LAST_WORDS_WAIT`.
     pub fn finish(self) {
-        // The other end sends nothing; it is dropped at the end.
+        // The other end sends no data; it is dropped at the end.
         let _ = self.0.recv_timeout(LAST_WORDS_WAIT);
     }
 }
@@ -71,7 +71,7 @@ mod tests {
         assert!(kept("more words", 4).starts_with("more\n... (cut here"));
     }
 
-    /// Nothing is written, and everything is read.
+    /// All output is read although none can be written.
     #[test]
     fn a_full_disk_lets_the_program_go_on() {
         struct Full;

@@ -72,7 +72,7 @@ impl Program {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
-            // The program could read files, so nothing is written within its reach while it runs.
+            // The program could read files, so no file is written within its reach while it runs.
             record: Some(Record::After),
             ..Layer::default()
         };
@@ -134,7 +134,7 @@ impl Program {
         let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
         let statuses: io::Result<Vec<String>> = groups.into_iter().map(ProcessGroup::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
-        // Of several programs nobody knows whose call it was.
+        // With several programs, the caller is unknown.
         let refusal = episode.last_refusal().filter(|_| participants.len() == 1);
         let found = exits.into_iter().zip(statuses).map(|((exit, env_steps), status)| {
             let refusal = refusal.clone().filter(|_| exit == ProgramExit::Failed);
@@ -158,8 +158,7 @@ impl Program {
                 if exit.is_none()
                     && let Some(well) = group.ended_well()?
                 {
-                    // A program that is found to have ended while the episode goes on has ended before
-                    // it.
+                    // If a program has ended and the episode still runs, the program ended first.
                     let found = match (episode.ended(), well) {
                         (true, _) => ProgramExit::After,
                         (false, true) => ProgramExit::Left,
@@ -180,8 +179,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // A program that left in order had done its part if the others completed the episode, or
-                // if one of them is to blame for its end.
+                // A program that exited normally had done its part if the others completed the episode, or if
+                // another program caused its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),
@@ -299,7 +298,8 @@ impl Policy for Program {
     }
 }
 
-/// Creates the folder of an episode. Refuses a link, whose creator would choose which files are written.
+/// Creates the folder of an episode. Refuses a link, because its creator would choose the files that are
+/// written.
 fn create_own_folder(folder: &Path) -> io::Result<()> {
     let is_link = fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
     if is_link {
@@ -325,11 +325,11 @@ struct FoundProgram {
     env_steps: u32,
     /// Exit status as text.
     status: String,
-    /// Reason why its last refused call was refused, if it has failed.
+    /// Reason of the program's last refusal, if it has failed.
     refusal: Option<String>,
 }
 
-/// State of a program at the end of the wait, as far as its end is concerned.
+/// State of a program's process at the end of the wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
     /// The program ended after its episode, or had completed its part and did not cause the end.
@@ -353,7 +353,7 @@ impl ProgramExit {
     }
 }
 
-/// Returns the last lines that a program has written to stderr, or else to stdout, as far as they fit.
+/// Returns as many of the last lines as fit that a program has written to stderr, or else to stdout.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
         let path = folder.join(name);

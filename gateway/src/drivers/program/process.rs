@@ -19,7 +19,7 @@ pub const BRIEF_FILE: &str = "brief.txt";
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 
-/// Time that a group has to end after the request to terminate.
+/// Time that a process group has to end after the request to terminate.
 const TERMINATION_GRACE: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -183,7 +183,7 @@ mod system {
         shell
     }
 
-    /// Makes the command start in a process group of its own.
+    /// Starts the command in a separate process group.
     pub fn in_own_group(command: &mut Command) {
         command.process_group(0);
     }
@@ -241,7 +241,7 @@ mod system {
         process::{Child, Command, Stdio},
     };
 
-    /// Creates the process of the shell that runs a command. It removes the outer quotes and nothing else.
+    /// Creates the process of the shell that runs a command. It only removes the outer quotes.
     pub fn shell(command: &str) -> Command {
         let mut shell = Command::new("cmd");
         shell.args(["/S", "/C"]).raw_arg(format!("\"{command}\""));

@@ -58,7 +58,8 @@ impl Lease {
             attempts -= 1;
             match FileLock::attempt(&path, LockKind::Exclusive)? {
                 Locking::Locked(lock) => break Some(lock.removing(&path)),
-                // Another server may be looking at it, and a fresh lease may have no owner written yet.
+                // Another server may be reading the file at this moment, and a fresh lease may have no owner
+                // yet.
                 Locking::Held if attempts > 0 && (attempts > SURE_AFTER || owner(&path).is_empty()) => {
                     thread::sleep(ATTEMPT_INTERVAL);
                 }
@@ -115,7 +116,7 @@ fn fresh_owner(path: &Path) -> Option<String> {
 
 fn owner(path: &Path) -> String {
     let mut text = String::new();
-    // A file that has just been made may not have its owner written yet.
+    // The owner of a new file may not have been written yet.
     let _ = File::open(path).and_then(|file| file.take(2048).read_to_string(&mut text));
     text.trim().into()
 }

@@ -44,7 +44,7 @@ impl LiveFolder {
         create_private_folder(&self.path)
     }
 
-    /// Returns the path of the journal of the episode `id`. An id that is no plain name has none.
+    /// Returns the path of the journal of the episode `id`; `None` for an id that is not a plain name.
     pub fn journal(&self, id: &str) -> Option<PathBuf> {
         let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
         let plain = !id.is_empty() && !id.starts_with('.') && id.bytes().all(is_plain);

@@ -32,7 +32,7 @@ pub struct Desk {
     stage: Arc<Stage>,
     session: PanicGuard,
     log: Option<Log>,
-    /// True once the episode is to sleep.
+    /// True once the episode is to be suspended.
     sleeps: bool,
     closing: Option<Closing>,
 }
@@ -92,14 +92,14 @@ impl Desk {
         self.session.run(work).flatten()
     }
 
-    /// Runs `work` on the session and writes what it has done to the journal.
+    /// Runs `work` on the session and writes its effects to the journal.
     pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
         let done = self.on_session(work);
         self.commit(None);
         done
     }
 
-    /// Lets the episode sleep after the jobs that have arrived by now, if it can be brought back.
+    /// Suspends the episode after the jobs that are in the queue now, if it can be brought back.
     pub fn sleep(&mut self) -> Outcome<()> {
         if self.log.is_some() {
             let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
@@ -135,7 +135,7 @@ impl Desk {
         kept
     }
 
-    /// Writes to the journal what has been done and the answers to calls with a key.
+    /// Writes the executed work to the journal, with the answers to calls that have a key.
     pub fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
         self.commit_noted(answers, None);
     }
@@ -188,7 +188,7 @@ impl Desk {
         });
         match begun {
             Ok(log) => {
-                // After a panic there is nothing to keep.
+                // After a panic there is no state to keep.
                 let _ = self.session.run(Session::keep_journal);
                 self.log = Some(log);
                 self.stage.status.durable.store(true, Relaxed);

@@ -55,7 +55,7 @@ pub struct EpisodeThread {
 }
 
 impl EpisodeThread {
-    /// Creates the world on a thread of its own, runs the initial hold and returns the policy's briefing.
+    /// Creates the world on a separate thread, runs the initial hold and returns the policy's briefing.
     pub async fn start(
         id: &str,
         spec: EpisodeSpec,
@@ -118,14 +118,14 @@ impl EpisodeThread {
         }
     }
 
-    /// Puts the episode to sleep if it can be brought back and nobody would notice.
+    /// Suspends the episode if it can be brought back and nobody would notice.
     pub fn put_aside(&self) {
         if self.may_sleep() {
             self.queue.send_if_idle(job(Desk::sleep).0);
         }
     }
 
-    /// Returns true if the episode could be put to sleep.
+    /// Returns true if the episode could be suspended.
     pub fn may_sleep(&self) -> bool {
         let Stage { status, feed, memory, .. } = &*self.stage;
         status.durable.load(Ordering::Relaxed)
@@ -226,7 +226,7 @@ impl EpisodeThread {
         self.queue.work_unless_full(move |desk| desk.note(operator.as_deref(), note, key)).await
     }
 
-    /// Records a call that was refused before it arrived here, after its caller's earlier calls. A
+    /// Records a call that was refused before it reached the episode, after its caller's earlier calls. A
     /// failure is ignored.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, RefusedCall { tool, arguments, problem }) = (operator.map(str::to_owned), call);

@@ -41,7 +41,7 @@ pub struct EveryStep(Arc<AtomicUsize>);
 pub struct LiveWatch {
     /// State of the episode when the watch began.
     pub view: LiveView,
-    /// Events after that. Some of them may be part of `view` already.
+    /// Events after that view. `view` may already contain some of them.
     pub events: broadcast::Receiver<LiveEvent>,
 }
 
@@ -54,7 +54,7 @@ pub struct FeedEnd {
 
 /// Rate limit of the steps that watchers receive.
 struct Pace {
-    /// Time at which the steps sent so far would have been sent at one step per interval.
+    /// Time of the last step, if the steps sent up to now had been sent at one step per interval.
     even_at: Cell<Instant>,
 }
 

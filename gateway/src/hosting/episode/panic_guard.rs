@@ -1,5 +1,4 @@
-//! The panic guard: a session that a panic ends without affecting anything else. Its work is counted in
-//! the metrics.
+//! The panic guard: a session in which a panic ends only this episode. Its work is counted in the metrics.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,8 +19,8 @@ pub struct PanicGuard {
 
 enum GuardState {
     Sound(Box<Session>),
-    /// After a panic the state of the world is undefined and no longer used. The result covers what could
-    /// be closed.
+    /// After a panic the state of the world is undefined and no longer used. The result covers the files that
+    /// could be closed.
     Panicked(Option<Box<ResultReply>>),
 }
 
@@ -136,7 +135,7 @@ impl EpisodeMetrics {
         EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
     }
 
-    /// Continues counting an episode that has been counted up to the state of `session`.
+    /// Continues the counts of an episode that has been counted up to the state of `session`.
     pub fn again(metrics: Arc<Metrics>, session: &Session) -> EpisodeMetrics {
         EpisodeMetrics {
             metrics,
@@ -152,7 +151,7 @@ impl EpisodeMetrics {
         self.count(session);
     }
 
-    /// Counts what the session has done since it was last counted.
+    /// Counts the session's work since the last count.
     pub fn count(&mut self, session: &Session) {
         let (control_steps, physics) = (session.present().control_step, session.physics());
         let since = control_steps.saturating_sub(self.control_steps);

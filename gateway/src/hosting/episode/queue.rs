@@ -24,7 +24,7 @@ pub struct JobQueue {
 }
 
 impl JobQueue {
-    /// Creates the end of the channel `jobs`, whose thread plays the episode of `stage`.
+    /// Creates the sending end of the channel `jobs`, whose thread plays the episode of `stage`.
     pub fn new(stage: Arc<Stage>, jobs: mpsc::Sender<Job>) -> JobQueue {
         JobQueue { jobs: Mutex::new(jobs), stage }
     }
@@ -75,7 +75,7 @@ impl JobQueue {
 
     /// Queues a job, however many are waiting.
     pub async fn send_in_turn(&self, mut job: Job) -> Result<(), HostingError> {
-        // The episode may fall asleep between the two.
+        // The episode may be suspended after `sender` has returned.
         while let Err(mpsc::error::SendError(unsent)) = self.sender()?.send(job).await {
             job = unsent;
         }
@@ -86,7 +86,7 @@ impl JobQueue {
     pub fn send_if_idle(&self, job: Job) {
         let jobs = self.lock();
         if jobs.capacity() == jobs.max_capacity() {
-            // An episode that has stopped meanwhile needs nothing any more.
+            // An episode that has stopped meanwhile has no more work.
             let _ = jobs.try_send(job);
         }
     }
@@ -140,6 +140,6 @@ pub fn job<T: Send + 'static>(
     work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
 ) -> (Job, oneshot::Receiver<Outcome<T>>) {
     let (reply, outcome) = oneshot::channel();
-    // What is done stays done if the caller has gone.
+    // Work that is done stays done even if the caller has gone.
     (Box::new(move |desk| drop(reply.send(desk.and_then(work)))), outcome)
 }

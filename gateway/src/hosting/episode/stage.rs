@@ -35,7 +35,7 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// Restores the memory of another process, and the answers and notes that may be requested again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
-    /// Drops what [`HostMemory::restore`] brings back, because the episode is put to sleep.
+    /// Drops the data that [`HostMemory::restore`] brings back, because the episode is suspended.
     fn let_go(&self);
 
     /// Returns true if a player in this process would miss the episode.
@@ -78,7 +78,7 @@ impl Stage {
         }
     }
 
-    /// Removes the journal of a sleeping episode, which will not be brought back.
+    /// Removes the journal of a suspended episode, which will not be brought back.
     pub fn forget_journal(&self) -> Result<(), HostingError> {
         let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
             return Ok(());

@@ -27,10 +27,10 @@ pub struct SharedStatus {
     thought: AtomicU64,
     /// Result of the episode once it has been closed.
     pub result: OnceLock<ResultReply>,
-    /// True if the episode can be brought back, and so put to sleep.
+    /// True if the episode can be brought back, and so suspended.
     pub durable: AtomicBool,
     sleep: Mutex<Option<Sleep>>,
-    /// True once everything from before the sleep is restored. The episode is woken up before that.
+    /// True once the state from before the suspension is restored. The episode is woken up before that.
     there: AtomicBool,
     /// Time of the last request.
     used: Mutex<Instant>,
@@ -38,11 +38,11 @@ pub struct SharedStatus {
     refusal: Mutex<Option<String>>,
 }
 
-/// Data of a sleeping episode.
+/// Data of a suspended episode.
 #[derive(Debug, Clone, Copy)]
 pub struct Sleep {
     pub since: Instant,
-    /// Policy's thinking time when the episode fell asleep.
+    /// Policy's thinking time when the episode was suspended.
     pub thinking: Duration,
 }
 
@@ -131,13 +131,13 @@ impl SharedStatus {
         lock(&self.refusal).clone()
     }
 
-    /// Marks the episode as asleep; `thinking` is the time since the policy was last answered.
+    /// Marks the episode as suspended; `thinking` is the time since the policy was last answered.
     pub fn fall_asleep(&self, thinking: Duration) {
         self.there.store(false, Release);
         *lock(&self.sleep) = Some(Sleep { since: Instant::now(), thinking });
     }
 
-    /// Marks the episode as asleep again, as before.
+    /// Marks the episode as suspended again, as before.
     pub fn sleep_on(&self, sleep: Sleep) {
         *lock(&self.sleep) = Some(sleep);
     }
@@ -146,7 +146,7 @@ impl SharedStatus {
         *lock(&self.sleep)
     }
 
-    /// Marks the state from before the sleep as restored.
+    /// Marks the state from before the suspension as restored.
     pub fn is_back(&self) {
         self.there.store(true, Release);
     }

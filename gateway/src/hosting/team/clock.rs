@@ -1,8 +1,8 @@
 //! The clock of one operator: it runs while the operator thinks and the episode may have to wait for it.
 //!
-//! It begins with the operator's first request. It stands while the operator's command waits or is executed,
-//! and once nobody waits for the operator any more. Each operator has the whole limit of the protocol.
-//! An operator in real time, who commands once in a control step, thinks only beyond that step.
+//! It begins with the operator's first request. It is paused while the operator's command waits or is
+//! executed, and once nobody waits for the operator any more. Each operator has the whole limit of the
+//! protocol. An operator in real time commands once in a control step, and thinks only beyond that step.
 
 use std::time::{Duration, Instant};
 
@@ -10,20 +10,20 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Default)]
 pub struct OperatorClock {
     spent: Duration,
-    /// Moment when it began to run, or will begin; `None` while it stands.
+    /// Moment when it began to run, or will begin; `None` while it is paused.
     since: Option<Instant>,
     /// Time after a command that counts as pacing.
     pace: Duration,
 }
 
 impl OperatorClock {
-    /// Runs from now on, if it does not yet; for an operator in real time once its pacing is over.
+    /// Starts the clock unless it runs already. For an operator in real time it starts after the pacing.
     pub fn run(&mut self) {
         let pace = self.pace;
         self.since.get_or_insert_with(|| Instant::now() + pace);
     }
 
-    /// Sets the time after a command that counts as pacing: a control step in real time, else none.
+    /// Sets the time after a command that counts as pacing: a control step in real time, and otherwise 0.
     pub fn set_pace(&mut self, pace: Duration) {
         self.pace = pace;
     }
@@ -34,7 +34,7 @@ impl OperatorClock {
         self.since = None;
     }
 
-    /// Returns the time for which it had run when it last stood.
+    /// Returns the running time up to the last pause.
     pub fn spent(&self) -> Duration {
         self.spent
     }
@@ -44,7 +44,7 @@ impl OperatorClock {
         self.spent + self.running().unwrap_or_default()
     }
 
-    /// Returns the time since it began to run; `None` while it stands.
+    /// Returns the time since it began to run; `None` while it is paused.
     pub fn running(&self) -> Option<Duration> {
         self.since.map(|since| since.elapsed())
     }

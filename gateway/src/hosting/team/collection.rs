@@ -1,6 +1,6 @@
 //! A collection: people who play one episode after another on a server of their own.
 //!
-//! Each person has a seat whose token stays the same, and marks every episode as good or bad.
+//! Each person has an operator's token that stays the same, and marks every episode as good or bad.
 
 use std::{
     fmt,

@@ -63,8 +63,7 @@ impl Driver {
         Ok((Driver { operators, number }, answers))
     }
 
-    /// Sets the person's request for its own robot. The others stand still, and time passes for all of
-    /// them alike.
+    /// Sets the person's request for its own robot. The others stand still, and their clocks run, too.
     pub fn say(&self, request: &DriverRequest) {
         self.each(|place, own| {
             if let Some(teleoperation) = own.as_mut().filter(|own| own.driver == self.number) {
@@ -76,8 +75,8 @@ impl Driver {
         });
     }
 
-    /// Returns the robots that the person waits for, once its own command has been waiting for longer
-    /// than `AWAY_AFTER`.
+    /// Returns the robots that the person waits for, once the person's own command has waited for longer than
+    /// `AWAY_AFTER`.
     pub fn waits_for(&self) -> Vec<String> {
         let Some(OperatorHandle { team, seat, .. }) = self.operators.first() else { return Vec::new() };
         let round = team.round();
@@ -103,8 +102,8 @@ impl Drop for Driver {
     }
 }
 
-/// Turns setpoints into commands, one control step after another, until nobody drives any more or the
-/// episode has ended.
+/// Turns setpoints into commands, one control step after another, until there is no driver or the episode has
+/// ended.
 async fn turn(any: OperatorHandle) {
     let mut ticks = interval(TICK);
     // Ticks that were missed are skipped, so that the loop never catches up.
@@ -125,7 +124,8 @@ async fn turn(any: OperatorHandle) {
     }
 }
 
-/// Commands a setpoint and sends the driver the answer, with the robot's state if it is told.
+/// Commands a setpoint and sends the driver the answer, with the robot's state if the driver has asked for
+/// it.
 async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool) {
     let mut answers = vec![operator.call(setpoint.call().into(), None).await];
     if tells_state {

@@ -1,4 +1,4 @@
-//! The operator of one robot of an episode. Its calls block until its robot's reply is there.
+//! The operator of one robot of an episode. Its calls block until its robot's reply is ready.
 
 use std::sync::{Arc, MutexGuard};
 
@@ -88,7 +88,7 @@ impl OperatorHandle {
         self.episode.ask(Some(self.robot()), call, keyed, then).await
     }
 
-    /// Notes that the operator has looked, and adds to a status what the others do.
+    /// Notes that the operator has observed, and adds the actions of the others to a status.
     fn looked(&self, answer: Answer) -> Answer {
         let mut round = self.round();
         round.operators[self.seat].has_looked();
@@ -156,7 +156,8 @@ impl OperatorHandle {
         }
     }
 
-    /// Finishes what has begun, even if its caller leaves, and keeps the answer to a call with a key.
+    /// Completes the work that has begun, even if its caller leaves, and keeps the answer to a call with a
+    /// key.
     pub(super) async fn finish_all(
         &self,
         keyed: Option<Keyed>,
@@ -177,8 +178,8 @@ impl OperatorHandle {
         self.round().goes_on(self.seat)
     }
 
-    /// Notes that the operator sends control steps in real time: its partners' commands go on over them, and
-    /// the steps' own time is no thinking.
+    /// Notes that the operator sends control steps in real time. Commands of its partners continue over these
+    /// steps, and the steps' own duration is not charged as thinking.
     pub fn pace(&self) {
         self.own(|own| {
             own.set_pace(TICK);
@@ -203,8 +204,8 @@ impl OperatorHandle {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Lets the operator leave. The episode ends when nobody is left; until then its robot holds still,
-    /// and the answer is the episode's status.
+    /// Lets the operator leave. The episode ends when the last operator has left. Until then its robot holds
+    /// still, and the answer is the episode's status.
     async fn finish(&self, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
         let others_play_on = !self.episode.ended() && self.round().finish(self.seat)?;
         let call: ToolCall = match others_play_on {
@@ -221,8 +222,8 @@ impl OperatorHandle {
         self.ask(call.into(), keyed, then).await
     }
 
-    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if it had
-    /// finished; the episode ends when nobody else plays.
+    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if the
+    /// operator had finished. The episode ends when no operator plays.
     fn check_clock(&self) -> Result<(), HostingError> {
         let limit = self.team.rules.thinking_limit;
         let Some(limit) = limit.filter(|limit| self.own(|own| own.thought()) >= *limit) else {
@@ -302,7 +303,8 @@ impl OperatorHandle {
         self.go_on();
     }
 
-    /// Restricts an answer to what the operator may see, and adds what it has not heard yet.
+    /// Restricts an answer to the parts that the operator may see, and adds the messages that it has not
+    /// received yet.
     fn own_answer(&self, answer: Answer) -> Answer {
         let (heard, thought) = self.own(|own| (own.take_heard(), own.thought()));
         let left_s = self.team.rules.thinking_limit.map(|limit| to_ms(limit.saturating_sub(thought)));

@@ -1,9 +1,9 @@
-//! The operators of an episode in which each robot has its own.
+//! The operators of an episode in which each robot has one.
 //!
-//! A step is made when every operator has commanded, or when the others' patience with the missing ones
-//! ends. Then the robots of the silent operators hold still, and nobody waits for them until they call
-//! again. The shortest of the commands ends them all. Each operator has a clock of its own. An operator's
-//! call blocks until its robot's reply is there.
+//! A step is made once every operator has commanded, or the time limit for the missing ones is over. Robots
+//! of silent operators then hold still, and nobody waits for these operators until they call again. All
+//! commands end with the shortest one. Each operator has a clock of its own. An operator's call blocks until
+//! the reply for its robot is ready.
 
 mod clock;
 mod collection;
@@ -109,17 +109,17 @@ impl Team {
         seat.places.try_acquire().map_err(|_| HostingError::TooManyWaiting { limit })
     }
 
-    /// Returns the part of the operators' state that has to be remembered.
+    /// Returns the part of the operators' state that a suspended episode keeps.
     pub fn memory(&self) -> Vec<OperatorMemory> {
         self.round().memory()
     }
 
-    /// Restores what was remembered.
+    /// Restores the kept state.
     pub fn restore(&self, memory: Vec<OperatorMemory>) {
         self.round().restore(memory);
     }
 
-    /// Returns true if somebody in this process drives, or waits for others.
+    /// Returns true if a player in this process drives, or waits for others.
     pub fn is_busy(&self) -> bool {
         self.round().is_busy()
     }

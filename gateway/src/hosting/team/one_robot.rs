@@ -31,8 +31,8 @@ pub struct OneRobot {
 }
 
 impl OneRobot {
-    /// Waits until another operator plays, because time must not pass while nobody does. Returns false
-    /// once all have finished or the episode has ended.
+    /// Waits until another operator plays, because time must not pass without players. Returns false once all
+    /// have finished or the episode has ended.
     pub fn wait_for_others(&self) -> bool {
         loop {
             let others = self.operator.round().state_of_others(self.operator.seat);

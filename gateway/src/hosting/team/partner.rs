@@ -1,8 +1,8 @@
 //! Partners of this process that drive one robot beside people or programs: the task's expert, or a
 //! learned policy.
 //!
-//! The expert plays its script for all robots, and its own robot does its part. If a step of the script
-//! does not succeed in time, the script gives up and begins again from the current state.
+//! The expert plays its script for all robots, and only the commands of its own robot are executed. If a step
+//! of the script does not succeed in time, the script gives up and begins again from the current state.
 
 use std::{sync::Arc, thread};
 
@@ -28,8 +28,8 @@ const PAUSE_STEPS: u32 = 25;
 impl OperatorHandle {
     /// Lets the expert of the task drive the robot until the episode ends or everybody else has finished.
     ///
-    /// The expert uses privileged information; that is recorded, and results name it. Repeated requests
-    /// change nothing.
+    /// The expert uses privileged information. That is recorded, and results state it. Repeated requests have
+    /// no effect.
     pub async fn take_expert(&self) -> Result<(), HostingError> {
         let (robot, spec) = (self.robot(), self.episode.spec().clone());
         Expert::for_episode(&spec).map_err(HostingError::NoExpert)?;
@@ -48,8 +48,8 @@ impl OperatorHandle {
     /// Lets `policy` drive the robot until the episode ends or everybody else has finished. Returns when it
     /// is connected.
     ///
-    /// The policy receives the inputs that its map names for all robots. Repeated requests change nothing
-    /// while it drives; a lost one is connected again.
+    /// The policy receives the inputs that its map names for all robots. Repeated requests have no effect
+    /// while it drives. After a lost connection it connects again.
     pub async fn take_policy(&self, policy: Arc<dyn PartnerPolicy>) -> Result<(), HostingError> {
         self.own(|own| own.check_plays())?;
         if self.own(|own| own.partner.replace(PartnerKind::Policy)).is_some() {
@@ -108,7 +108,7 @@ pub async fn seat_again(
     }
 }
 
-/// Plays until nobody else does.
+/// Plays until no other operator plays.
 fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
     while own.wait_for_others() {
         let played = Expert::for_episode(spec).and_then(|mut expert| expert.play(&mut own));
@@ -125,7 +125,7 @@ fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
             }
         }
     }
-    // The others stop waiting for it. An ended episode cannot be notified.
+    // The others no longer wait for this operator. An ended episode cannot be notified.
     let _ = own.ask(Finish {}.into());
 }
 
@@ -145,7 +145,7 @@ fn play_policy(
     };
     let operator = own.operator.clone();
     let mut connected = || {
-        // The policy's first look shows all that has happened until now.
+        // The policy's first observation includes everything that has happened until now.
         operator.own(Operator::has_looked);
         answer(Ok(()));
     };

@@ -1,5 +1,5 @@
-//! Plans of one operator: each command goes through the team's rounds like any other, and those of the
-//! partners go on over as many of them as they have steps.
+//! Plans of one operator. Each command goes through the team's rounds like any other. A partner's command
+//! continues over as many rounds as it has steps.
 
 use tandem_episodes::{OperatorCall, PlanAdvance, PlanRun};
 use tandem_tools_spec::{ActCall, Call, CommandReply, Heard, Partner, PlanCall, ToolCall, ToolReply};
@@ -28,7 +28,7 @@ impl Drop for PlanUnderWay {
 }
 
 impl OperatorHandle {
-    /// Carries out a plan, or refuses all of it.
+    /// Executes a plan, or refuses the whole plan.
     pub(super) async fn plan(
         &self,
         call: OperatorCall,

@@ -33,7 +33,7 @@ pub struct Round {
     pub plans: u32,
 }
 
-/// The operator of one robot, and what drives the robot in this process.
+/// The operator of one robot, and the player in this process that drives the robot.
 #[derive(Debug, Default)]
 pub struct Operator {
     pub robot: String,
@@ -83,14 +83,14 @@ pub struct OperatorMemory {
     partner: Option<PartnerKind>,
 }
 
-/// State of the other operators, as seen by one.
+/// State of the other operators, from the view of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Others {
-    /// At least one plays.
+    /// At least one other operator plays.
     There,
-    /// None has commanded within the others' patience.
+    /// No other operator has commanded within the patience.
     Away,
-    /// All have finished.
+    /// All other operators have finished.
     Gone,
 }
 
@@ -102,7 +102,7 @@ enum OperatorState {
     Waiting(Box<Pending>),
     /// The operator's command is being executed.
     Acting,
-    /// The operator has used up the others' patience; they do not wait for it.
+    /// The operator has used up the others' patience; they no longer wait.
     Silent,
     /// The operator has called finish.
     Finished,
@@ -123,17 +123,17 @@ impl Round {
         Round { operators: robots.map(operator).collect(), ..Round::default() }
     }
 
-    /// Returns the state of each operator that has to be remembered.
+    /// Returns the state of each operator that a suspended episode keeps.
     pub fn memory(&self) -> Vec<OperatorMemory> {
         self.operators.iter().map(Operator::memory).collect()
     }
 
-    /// Restores what was remembered.
+    /// Restores the kept state.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
         self.operators.iter_mut().zip(memory).for_each(|(operator, memory)| operator.restore(memory));
     }
 
-    /// Returns true if somebody in this process drives, or waits for others.
+    /// Returns true if a player in this process drives, or waits for others.
     pub fn is_busy(&self) -> bool {
         let drives = |operator: &Operator| {
             operator.partner.or(operator.left).is_some() || operator.teleoperation.is_some()
@@ -150,7 +150,7 @@ impl Round {
             || self.others(seat).any(|operator| operator.paced)
     }
 
-    /// Returns what the operators on other seats than `seat` do.
+    /// Returns the actions of the operators other than that of `seat`.
     pub fn presence(&self, seat: usize) -> Vec<Presence> {
         self.others(seat).map(Operator::presence).collect()
     }
@@ -197,7 +197,7 @@ impl Round {
         thinking.map(|operator| operator.robot.clone()).collect()
     }
 
-    /// Returns the state of the operators on other seats than `seat`.
+    /// Returns the states of the operators other than that of `seat`.
     pub fn state_of_others(&self, seat: usize) -> Others {
         let all = |of: fn(&OperatorState) -> bool| self.others(seat).all(|operator| of(&operator.state));
         if all(|state| matches!(state, OperatorState::Finished)) {
@@ -250,8 +250,7 @@ impl Round {
         taken
     }
 
-    /// Ends the step, which has been made with `answer` or has failed. Returns what each robot did, by
-    /// seat.
+    /// Ends the step, which has succeeded with `answer` or failed. Returns each robot's outcome, by seat.
     pub fn end(&mut self, answer: Option<&Answer>) -> Vec<PartnerDid> {
         self.number += 1;
         let made = answer.and_then(|answer| match &answer.reply {
@@ -371,7 +370,7 @@ impl Operator {
         }
     }
 
-    /// Counts a message of its own, and returns the number of its earlier ones.
+    /// Counts a message that this operator has sent, and returns the number of its earlier messages.
     pub fn count_said(&mut self) -> u32 {
         self.said += 1;
         self.said - 1
@@ -395,7 +394,7 @@ impl Operator {
         Presence { robot: self.robot.clone(), state, thinking_s }
     }
 
-    /// Lets nobody wait for it any more until it calls again, if it thinks.
+    /// Stops the others from waiting for it until it calls again, if it is thinking.
     pub fn fall_silent(&mut self) {
         if let OperatorState::Thinking = self.state {
             self.state = OperatorState::Silent;

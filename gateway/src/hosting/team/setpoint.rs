@@ -92,7 +92,7 @@ impl Teleoperation {
         self.request.tells_state = request.tells_state;
     }
 
-    /// Returns the next setpoint if time may pass at `now`, and true if the robot's state is to be told.
+    /// Returns the next setpoint if time may pass at `now`, and true if the robot's state is to be sent.
     pub fn due(&mut self, now: Instant) -> Option<(Setpoint, bool)> {
         let is_there = now.duration_since(self.requested) < AWAY_AFTER;
         let DriverRequest { setpoint, tells_state, go, steps } = &mut self.request;

@@ -101,7 +101,7 @@ pub async fn serve(
 }
 
 impl Serving {
-    /// Serves a connection that has to be encrypted. A client that sends plain HTTP gets an explanation.
+    /// Serves a connection that has to be encrypted. A client that sends plain HTTP receives an explanation.
     async fn encrypted(self, stream: TcpStream, tls: TlsAcceptor, connection: Arc<Connection>) {
         let mut stopping = self.stopping.clone();
         let begun = tokio::select! {

@@ -25,7 +25,7 @@ use crate::{
     },
 };
 
-/// Adds the [`Caller`] to a request and removes the token from it.
+/// Adds the [`Caller`] to a request and removes the token.
 pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let watches = is_watching(request.uri().path()) && app.watch_key.opens(request.headers());
     // The start page and the operators' page have only public content.

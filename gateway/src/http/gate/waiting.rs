@@ -45,7 +45,7 @@ struct WaitingEntry {
     crowding: Arc<Crowding>,
 }
 
-/// Tells a connection that it has to make room.
+/// Tells a connection that it has to close.
 #[derive(Debug, Default)]
 struct Crowding {
     is_out: AtomicBool,
@@ -92,8 +92,9 @@ impl WaitingConnections {
         }
     }
 
-    /// Adds a connection; one that waits already keeps its place, and one that has to close gets none. If its
-    /// address has too many, the one with the longest wait is closed, preferably one without a good call.
+    /// Adds a connection. A connection that already waits keeps its place, and one that has to close gets no
+    /// place. If its address has too many, the one with the longest wait is closed, preferably one without a
+    /// valid call.
     fn add(&self, connection: &Connection) {
         let mut waiting = self.lock();
         if connection.crowding.is_out.load(Ordering::Relaxed) {

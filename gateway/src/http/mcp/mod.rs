@@ -43,7 +43,8 @@ use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 /// Accept header that the library requires; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
-/// Returns what a host tells its model about the server as a whole: only what `caller` can do.
+/// Returns a host's text for its model about the server as a whole, limited to the calls that `caller` may
+/// make.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call start_episode, whose tasks list_tasks names, then look".into(),
@@ -200,8 +201,8 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    /// Returns the instructions for `caller`. An operator's have its part of the task and how to play with
-    /// partners, since a model may see nothing else of the briefing.
+    /// Returns the instructions for `caller`. An operator's contain its part of the task and advice on
+    /// playing with partners, since a model may see no other part of the briefing.
     async fn instructions(&self, caller: &Caller) -> String {
         let begin = instructions(caller);
         let Caller::Operator { episode, .. } = caller else { return begin };
@@ -287,7 +288,8 @@ impl McpServer {
     }
 }
 
-/// Asks for a short reply unless the call says otherwise: a model reads all of it, and the instructions say so.
+/// Asks for a short reply, unless the call requests a full one: a model reads the whole reply, and the
+/// instructions say so.
 fn short_unless_given(mut args: Value) -> Value {
     if let Some(args) = args.as_object_mut() {
         args.entry("short").or_insert(true.into());
@@ -382,7 +384,7 @@ async fn check_body(request: extract::Request, next: Next) -> Response {
     next.run(extract::Request::from_parts(parts, bytes.into())).await
 }
 
-/// Sets the Accept header that the library requires, for a client that accepts anything or sends no such
+/// Sets the Accept header that the library requires, for a client that accepts any type or sends no such
 /// header.
 fn accept_whatever_fits(parts: &mut Parts) {
     let accepted = parts.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());

@@ -1,5 +1,5 @@
-//! Resources that MCP hosts may read: an episode's briefing and the brief of the server, as tools do not
-//! repeat them, and pages of the book.
+//! Resources that MCP hosts may read: an episode's briefing, the brief of the server, and pages of the book.
+//! Tools do not repeat the two briefs.
 
 use std::sync::Arc;
 
@@ -64,7 +64,7 @@ pub fn image(link: &ImageLink) -> Resource {
     Resource::new(uri, name).with_mime_type("image/png")
 }
 
-/// Returns the linked image of this URI; `None` if it is of none.
+/// Returns the linked image of this URI; `None` if the URI is no link to an image.
 fn read_image(app: &AppState, caller: &Caller, uri: &str) -> Option<Result<ReadResourceResult, ErrorData>> {
     let (id, name) = uri.strip_prefix(IMAGES)?.split_once("/images/")?;
     let png = app.table.hosted(id).and_then(|hosted| hosted.image(caller, name)).map_err(ApiError::from);
@@ -107,7 +107,8 @@ pub async fn read(app: &AppState, caller: &Caller, uri: &str) -> Result<ReadReso
     Ok(ReadResourceResult::new(vec![ResourceContents::text(text, uri)]))
 }
 
-/// Returns the pages that policies of this server may read: they speak of what only `full` tells.
+/// Returns the pages that policies of this server may read: they describe information that only `full`
+/// includes.
 fn pages(app: &AppState, caller: &Caller) -> Vec<Page> {
     let of_operators = matches!(caller, Caller::Operator { .. }).then_some(OPERATORS);
     match app.settings.assistance {

@@ -260,7 +260,7 @@ impl DriversPage {
                 let result = (*result).clone().disclosed(self.disclosure);
                 sender.text(json!({ "kind": "ended", "result": result }).to_string()).await
             }
-            // The page gets the outcome of its own commands as any operator does.
+            // The page gets the outcome of its own commands like any operator.
             LiveEvent::Entry(_) | LiveEvent::Phase(_) | LiveEvent::NextPhase(_) => Ok(()),
         }
     }

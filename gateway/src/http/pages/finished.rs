@@ -161,7 +161,7 @@ pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
     let bytes = read.await?;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
-        // A report is a page of its own; its scripts are disabled.
+        // A report is a separate page; its scripts are disabled.
         (
             header::CONTENT_SECURITY_POLICY,
             "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'".into(),

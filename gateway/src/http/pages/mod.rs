@@ -30,12 +30,12 @@ const SHELL: &str = include_str!("../../../web/page.html");
 const STYLE: &str = include_str!("../../../web/style.css");
 const DOOR: &str = include_str!("door.html");
 
-/// Content security policy: everything comes from this server, nothing may be sent elsewhere, and no
-/// other site may embed the page.
+/// Content security policy: all content comes from this server, nothing may be sent elsewhere, and no other
+/// site may embed the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Path of the pages; everything below it is for watchers.
+/// Path of the pages. All pages below it are for watchers.
 pub const WATCH: &str = "/watch";
 
 /// Time for which browsers keep an image on a surface: its address changes with its content.

@@ -5,7 +5,7 @@ use qrcode::{QrCode, render::svg, render::unicode, types::QrError};
 /// Renders a QR code as SVG.
 pub fn qr_svg(text: &str) -> Result<String, QrError> {
     let code = QrCode::new(text)?;
-    // Readers need a light margin around dark modules, whatever the background of the page is.
+    // Readers need a light margin around dark modules on any background.
     let colours = (svg::Color("#000"), svg::Color("#fff"));
     Ok(code.render().min_dimensions(240, 240).dark_color(colours.0).light_color(colours.1).build())
 }

@@ -1,4 +1,4 @@
-//! The script of all pages. It is embedded with gzip, as browsers ask for it.
+//! The script of all pages. It is embedded with gzip, which all browsers accept.
 
 use std::{io::Read, sync::LazyLock};
 

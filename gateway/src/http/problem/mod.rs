@@ -1,5 +1,5 @@
-//! Refusals as RFC 9457 problem details. The detail says what would work; the text of a server fault is
-//! only logged.
+//! Refusals as RFC 9457 problem details. The detail says which calls would work. The text of a server fault
+//! is only logged.
 
 #[cfg(test)]
 mod goldens;
@@ -109,7 +109,7 @@ pub enum ApiError {
         /// Requested hash.
         hash: String,
     },
-    /// The server has no collection, or the caller is not part of it.
+    /// The server has no collection, or the caller does not take part in it.
     #[error(
         "nobody collects episodes by this server and token; tandem collect --operators N prints the links of \
          those who do"

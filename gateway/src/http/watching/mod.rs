@@ -13,5 +13,5 @@ pub use recording_reader::{RECORDING, RecordingReader, no_recording, unreadable}
 pub use task_pictures::TaskPictures;
 pub use textures::KnownTextures;
 
-/// Maximum number of pages that watch at once.
+/// Maximum number of pages that watch at the same time.
 pub const MAX_WATCHERS: usize = 64;

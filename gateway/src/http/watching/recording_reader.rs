@@ -67,7 +67,7 @@ impl RecordingReader {
     }
 }
 
-/// The recording that was viewed last, because a page requests many images of one.
+/// The recording that was viewed last. It is kept because a page requests many images of one recording.
 #[derive(Default)]
 pub struct LastOpened(Option<OpenedRecording>);
 

@@ -17,7 +17,7 @@ use tandem_episodes::{Recorder, Recording, tasks};
 
 use crate::{Delays, Server};
 
-/// Number of kills in a test, with tasks in turn.
+/// Number of kills in a test, with alternating tasks.
 const KILLS: usize = 5;
 /// Maximum time of a kill after the first call.
 const LATEST_KILL_MS: u64 = 500;
@@ -70,7 +70,7 @@ impl<'a> Restarted<'a> {
     }
 }
 
-/// Returns the calls of a policy, some of which are refused.
+/// Returns the calls of a policy. The server refuses some of them.
 fn script(robot: &str, seed: u64) -> Vec<(&'static str, Value)> {
     let walk = json!({ "steps": 12, "robots": [{ "robot": robot, "vx_m_s": 0.1, "vy_m_s": 0.05, "yaw_rate_rad_s": 0.2 }] });
     let plan = json!({ "commands": [

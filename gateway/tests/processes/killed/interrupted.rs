@@ -40,7 +40,7 @@ fn kill(signal: &str, child: &Child) {
     assert!(killed.expect("kill").success());
 }
 
-/// Reads everything that the process writes to a pipe.
+/// Reads all output that the process writes to a pipe.
 fn text(pipe: Option<impl Read>) -> String {
     let mut text = String::new();
     pipe.expect("a pipe").read_to_string(&mut text).expect("UTF-8");

@@ -1,11 +1,11 @@
-// What the wearer of a headset is told, on a board below the line of sight: how the episode stands, what the hands do, what is left.
+// Text for the wearer of a headset, on a board below the line of sight: the state of the episode and of the hands, and the remaining budget.
 
 import { CanvasTexture, Mesh, MeshBasicMaterial, NoColorSpace, PlaneGeometry, SRGBColorSpace } from "three";
 
 const WIDTH_M = 0.9;
 const PIXELS = [1024, 192];
 const LINE_PIXELS = 44;
-/** Before the eyes, and tilted towards them. */
+/** Place before the eyes; the board is tilted towards them. */
 const PLACE_M = [0, -0.52, -0.95];
 const TILT_RAD = -0.5;
 
@@ -13,7 +13,7 @@ const TILT_RAD = -0.5;
 export class Board {
   /**
    * @param {import("three").Group} rig The space of the wearer.
-   * @param {boolean} isLitByFile True in a scene whose colours are no linear light.
+   * @param {boolean} isLitByFile True in a scene whose colours are not linear light.
    */
   constructor(rig, isLitByFile) {
     const canvas = document.createElement("canvas");
@@ -22,7 +22,7 @@ export class Board {
     this.texture = new CanvasTexture(canvas);
     this.text = "";
     this.texture.colorSpace = isLitByFile ? NoColorSpace : SRGBColorSpace;
-    // Seen before whatever is in its place, as the table is.
+    // The board is drawn over all objects at its place, for example a table.
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true, depthTest: false });
     const board = new Mesh(new PlaneGeometry(WIDTH_M, (WIDTH_M * PIXELS[1]) / PIXELS[0]), material);
     board.position.fromArray(PLACE_M);
@@ -31,7 +31,7 @@ export class Board {
     rig.add(board);
   }
 
-  /** Shows lines; those that do not fit on one go on in the next. @param {string[]} lines */
+  /** Shows lines. A line that is too long continues in the next. @param {string[]} lines */
   say(lines) {
     const text = lines.join("\n");
     const { paper } = this;
@@ -51,7 +51,7 @@ export class Board {
 }
 
 /**
- * Breaks a line into as many as its width takes.
+ * Breaks a line into lines that fit the width.
  * @param {CanvasRenderingContext2D} paper
  * @param {string} line
  * @param {number} width

@@ -1,5 +1,5 @@
-// A person's tracked hand as the fingers of a Dex3-1: vector retargeting, as in dex-retargeting. The joints are sought whose fingertips
-// lie, seen from the wrist, where the person's do:
+// A person's tracked hand as the fingers of a Dex3-1: vector retargeting, like in dex-retargeting. It finds the joints whose fingertips
+// have the same places relative to the wrist as the person's:
 //
 //   min_q  sum_i |s v_i - f_i(q)|^2 + m |q - q_before|^2,   low <= q <= high
 //
@@ -39,7 +39,7 @@ const ROBOT_AXES = {
 };
 
 /**
- * Returns how a robot's wrist is turned that does as a person's wrist.
+ * Returns the orientation of a robot's wrist for that of a person's wrist.
  * @param {Side} side
  * @param {Quaternion} turn
  */
@@ -63,7 +63,7 @@ export class Fingers {
   }
 
   /**
-   * Follows a hand for another while.
+   * Follows a hand for the time that has passed.
    * @param {(number[] | null)[]} positions Places of its 25 joints in metres, in the space of the headset; null where one is not seen.
    * @param {Quaternion} wristTurn Orientation of its wrist there.
    * @param {number} passedS

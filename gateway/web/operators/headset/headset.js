@@ -1,4 +1,4 @@
-// A person in a headset, by WebXR: stands in the robot's place, sees the scene from its head in stereo, and moves its wrists by
+// A person in a headset, by WebXR, who stands in the robot's place, sees the scene from its head in stereo, and moves its wrists by
 // controllers or by their own hands. The readings of a side have the names of Unitree's televuer, such as `ctrl_squeeze` and `hand_pos`
 // for its `left_ctrl_squeeze` and `left_hand_pos`.
 
@@ -8,11 +8,11 @@ import { Board } from "./board.js";
 import { Fingers, robotTurn } from "./fingers.js";
 
 const STICK_DEAD = 0.15;
-/** televuer's values of a trigger go from 10, let go, to 0, fully pressed. */
+/** televuer's values of a trigger range from 10, released, to 0, fully pressed. */
 const TRIGGER_LET_GO = 10;
 /** Numbers of the buttons of a controller in WebXR's `xr-standard` mapping. */
 const [TRIGGER, SQUEEZE, A, B] = [0, 1, 4, 5];
-/** A longer time between two pictures was a pause. */
+/** Minimum time between two pictures that counts as a pause. */
 const MOST_PASSED_S = 0.1;
 
 const dead = (/** @type {number | undefined} */ value) => (Math.abs(value ?? 0) < STICK_DEAD ? 0 : value ?? 0);
@@ -58,7 +58,7 @@ export class Headset {
   /** Latest readings. @type {Record<Side, Read>} */
   data = { left: {}, right: {} };
   /**
-   * Poses of a wearer's hand and of the robot's wrist when the one took hold of the other.
+   * Poses of a wearer's hand and of the robot's wrist at the moment when the hand began to move the wrist.
    * @type {Record<Side, { from: Pose, hand: Pose } | null>}
    */
   held = { left: null, right: null };
@@ -73,13 +73,13 @@ export class Headset {
     this.fingers = bySide((side, index) => new Fingers(side, joints[index]));
   }
 
-  /** Tells whether this browser has a headset. */
+  /** Returns true if this browser has a headset. */
   static async supported() {
     return (await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false)) ?? false;
   }
 
   /**
-   * Draws into the headset until its wearer leaves. `drawn` is called before every picture, and answers with
+   * Draws into the headset until its wearer leaves. `drawn` is called before every picture, and returns
    * lines for the wearer.
    * @param {() => string[]} drawn
    */
@@ -112,13 +112,13 @@ export class Headset {
     this.stage.ride(null);
   }
 
-  /** Takes the wearer out of it. */
+  /** Ends the wearer's session. */
   leave() {
     this.session?.end();
   }
 
   /**
-   * Takes in where controllers and hands are.
+   * Reads the poses of controllers and hands.
    * @param {XRSession} session
    * @param {XRFrame} frame
    * @param {XRReferenceSpace} space
@@ -150,7 +150,7 @@ export class Headset {
         own.ctrl_bButton = buttons[B]?.pressed ?? false;
       }
     }
-    // A hand that is seen is meant; a controller is while it is squeezed.
+    // A visible hand always moves its wrist; a controller only while it is squeezed.
     for (const side of SIDES) {
       const seen = Boolean(this.data[side].hand_pos);
       this.follow(side, poses[side], seen || this.data[side].ctrl_squeeze, seen);
@@ -158,8 +158,8 @@ export class Headset {
   }
 
   /**
-   * Moves a wrist of the robot as the wearer's moves while that is meant; let go, it stays: so the wearer's arm can come back. A
-   * controller turns it by as much as it turns itself; a hand that is seen turns it as it is turned.
+   * Moves a wrist of the robot with the wearer's while the wearer holds it. After a release it stays, so that the wearer's arm can
+   * return. A controller turns it by its own rotation; a visible hand gives it the hand's orientation.
    * @param {Side} side
    * @param {Pose | null | undefined} pose
    * @param {boolean | undefined} meant
@@ -179,8 +179,8 @@ export class Headset {
   }
 
   /**
-   * Returns what sticks, buttons and triggers ask for, as keys and gamepads do, and the fingers of hands that
-   * are seen.
+   * Returns the requests of sticks, buttons and triggers, like those of keys and gamepads, and the fingers of visible
+   * hands.
    */
   wanted() {
     const { data } = this;

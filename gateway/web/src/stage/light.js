@@ -1,4 +1,4 @@
-// The light of a scene: in rooms, walls and lamps around and a sun that casts shadows; in a scene whose file has lights, these.
+// The light of a scene. Rooms have surrounding walls and lamps, and a sun that casts shadows. Scenes whose file has lights have these.
 
 import {
   AmbientLight, BackSide, BoxGeometry, Color, DirectionalLight, FrontSide, Group, HemisphereLight, Mesh, MeshBasicMaterial, PMREMGenerator, PointLight,
@@ -11,7 +11,7 @@ const SHADOW_TEXELS = 1024;
 const [SUN_RADIUS_M, LAMP_RADIUS_M] = [2.2, 2.5];
 /** Distance of such a light from the middle of the robots. */
 const AWAY_M = 6;
-/** Lights of a file that cast shadows, at most: each takes another picture of the scene. */
+/** Maximum number of a file's lights that cast shadows. Each takes another picture of the scene. */
 const MOST_SHADOWS = 2;
 /** Side of the cube with the sky, within what cameras see. */
 const SKY_M = 20;
@@ -22,14 +22,14 @@ const AROUND = { size_m: [9, 9, 4.5], side: [0.55, 0.54, 0.51], floor: [0.22, 0.
 const LAMP_SIZE_M = [1.8, 1.2, 0.05];
 const LAMPS_AT_M = [[-2, -2], [-2, 2], [2, -2], [2, 2]];
 const SUN_INTENSITY = 1.1;
-/** Light of that room on surfaces that face up and down, where a processor draws. */
+/** Light of that room on surfaces that face up and down, for drawing without a graphics processor. */
 const [ABOVE, BELOW] = [[0.84, 0.83, 0.8], [0.28, 0.26, 0.24]];
 
 /** @typedef {import("../message.js").Lamp} Lamp */
 /** @typedef {import("../message.js").Lights} Lights */
 /** @typedef {import("../message.js").Rgb} Rgb */
 /**
- * Lights of a scene: those that cast shadows, those that objects carry with what puts them there, and what follows the robots.
+ * Lights of a scene: those that cast shadows, those that objects carry, with their carriers, and a function that makes lights follow the robots.
  * @typedef {{
  *   casting: (DirectionalLight | SpotLight)[], carried: { thing: import("three").Object3D, carrier: import("../message.js").Carrier }[],
  *   follow: (middle: Vector3) => void,
@@ -99,7 +99,7 @@ export function lightByFile(scene, { headlight, lamps }, casts) {
   add(headlight.ambient);
   const head = new DirectionalLight(new Color(...headlight.diffuse), Math.PI);
   scene.add(head, head.target);
-  // It shines along the optical axis of whichever camera looks.
+  // It shines along the optical axis of the present camera.
   scene.onBeforeRender = (_renderer, _scene, camera) => {
     head.position.setFromMatrixColumn(camera.matrixWorld, 2);
     head.updateMatrixWorld();
@@ -137,7 +137,7 @@ export function lightByFile(scene, { headlight, lamps }, casts) {
 }
 
 /**
- * Makes a light of a file, which shines `Math.PI` times as strong as a surface that it shines on straight: that is the convention of three.js.
+ * Makes a light of a file, `Math.PI` times as strong as a surface that it illuminates vertically, by the convention of three.js.
  * @param {Lamp} lamp
  */
 function lightOf({ kind, diffuse, attenuation, cutoff_rad: cutoff, exponent, position_m: [, , height] }) {
@@ -161,8 +161,8 @@ function fall([constant, linear, square], distanceM) {
 }
 
 /**
- * Returns the cone of a spot, which fades as a step between two angles does: it has half of its light at the angle where the cosine's
- * power has.
+ * Returns the cone of a spot, which fades between two angles. It has half of its light at the same angle as the power of
+ * the cosine.
  * @param {number} cutoff
  * @param {number} exponent
  */
@@ -173,7 +173,7 @@ function cone(cutoff, exponent) {
 }
 
 /**
- * Has a light cast shadows.
+ * Makes a light cast shadows.
  * @param {DirectionalLight | SpotLight} light
  * @param {boolean} casts
  * @param {number} radiusM
@@ -189,7 +189,7 @@ function shadows(light, casts, radiusM) {
 }
 
 /**
- * Adds the image of a sky, around whichever camera looks.
+ * Adds the image of a sky around the present camera.
  * @param {Scene} scene
  * @param {import("three").Texture} cube
  */

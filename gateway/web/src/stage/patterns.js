@@ -1,4 +1,4 @@
-// Patterns of surfaces, which are functions of the point, as the server's renderers draw them: `sim/src/render/shading/pattern.rs`.
+// Patterns of surfaces, which are functions of the point, like in the server's renderers: `sim/src/render/shading/pattern.rs`.
 
 /** The numbers of the patterns, by their names there. */
 export const PATTERN_NUMBERS = {
@@ -20,7 +20,7 @@ export const PATTERN_NUMBERS = {
 const NUMBERS = Object.entries(PATTERN_NUMBERS).map(([name, value]) => `const float ${name} = ${value.toFixed(4)};`).join("\n");
 
 /**
- * Patterns but plain ones: the second colour as a share of the first, the share of the second at a point in GLSL, its mean, and the
+ * All patterns except plain ones: the second colour as a share of the first, the share of the second at a point in GLSL, its mean, and the
  * finest period, below which the mean is drawn.
  * @type {Record<"checker" | "wood" | "fabric" | "print", { dark: number, share: string, mean: number, finestPerM: number }>}
  */
@@ -53,7 +53,7 @@ export const PATTERNS = {
   },
 };
 
-/** Periods a pixel from which a pattern begins to fade to its mean, and from which that is all of it. */
+/** Periods per pixel at which a pattern begins to fade to its mean, and at which only the mean is left. */
 const FADES_PER_PIXEL = [0.3, 0.7];
 
 /**

@@ -1,4 +1,4 @@
-// An episode in three dimensions: the shapes that the server draws robots' pictures of, put where a step has them.
+// An episode in three dimensions: the shapes of which the server draws the robots' images, at their poses in a step.
 
 import {
   ArrowHelper, BufferAttribute, BufferGeometry, Color, Group, Line, LineBasicMaterial, LineSegments, LinearSRGBColorSpace, Matrix4, Mesh,
@@ -16,11 +16,11 @@ const UP = new Vector3(0, 0, 1);
 const METRES_PER_NEWTON = 0.006;
 const LEAST_SHOWN_N = 1;
 const FRUSTUM_M = 0.55;
-/** Wrists nearer to their targets need no ghost. */
+/** Minimum distance of a wrist from its target at which the target is drawn. */
 const GHOST_FROM_M = 0.01;
-/** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
+/** Maximum number of the page's pixels per pixel of the picture, if drawing takes long. */
 const MOST_COARSENESS = 3;
-/** Time without motion after which a picture is drawn once more, as finely as the page is. */
+/** Time without motion after which a picture is drawn once more, at the page's full resolution. */
 const STILL_MS = 300;
 const SOFTWARE_COARSENESS = 1.5;
 /** @type {Record<string, string>} */
@@ -30,7 +30,7 @@ const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad",
 /** @typedef {import("../targets.js").Target} Target */
 /** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras Drawing of a hand. */
 /**
- * Puts a thing to the pose at a place of a row.
+ * Moves an object to the pose at a place of a row.
  * @typedef {(thing: import("three").Object3D, at: number) => void} Poser
  */
 
@@ -45,14 +45,14 @@ export class Stage {
     this.head = head;
     this.layout = layout;
     this.place = place;
-    // Where a processor draws, smooth edges and shadows take two thirds of the time, and reflections twice the rest.
+    // Without a graphics processor, smooth edges and shadows take two thirds of the time, and reflections twice the remaining time.
     const quick = !drawnBySoftware();
     this.coarseness = quick ? 1 : SOFTWARE_COARSENESS;
     this.renderer = new WebGLRenderer({ antialias: quick, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = quick;
     place.append(this.renderer.domElement);
     this.scene = new Scene();
-    /** True if the file's lights multiply its colours as they are: then nothing is linear light. */
+    /** True if the file's lights multiply its colour values directly. No value is linear light then. */
     this.isLitByFile = head.lights !== null;
     if (this.isLitByFile) this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.light = head.lights ? lightByFile(this.scene, head.lights, quick) : lightRoom(this.renderer, this.scene, quick);
@@ -93,7 +93,7 @@ export class Stage {
     this.paint();
   }
 
-  /** Takes over the colours of the page. */
+  /** Applies the colours of the page. */
   paint() {
     this.scene.background = this.paper(colour("--sky"));
     this.robots.forEach(({ frustum, hands }, index) => {
@@ -113,7 +113,7 @@ export class Stage {
     return this.isLitByFile ? made.convertLinearToSRGB() : made;
   }
 
-  /** Takes over the size of the place; in fine pixels where nothing moves. */
+  /** Applies the size of its element, at full resolution if nothing moves. */
   resize(fine = false) {
     const { clientWidth: width, clientHeight: height } = this.place;
     if (!width || !height) return;
@@ -124,9 +124,9 @@ export class Stage {
   }
 
   /**
-   * Adds all shapes to the scene, and its sky. Returns what moves with a carrier, lights included.
+   * Adds all shapes to the scene, and its sky. Returns the objects that move with a carrier, including lights.
    * @param {import("../message.js").Mesh[]} meshes
-   * @param {boolean} quick False where a processor draws.
+   * @param {boolean} quick False without a graphics processor.
    */
   build(meshes, quick) {
     const { head, light } = this;
@@ -177,7 +177,7 @@ export class Stage {
   }
 
   /**
-   * Puts everything where it is a `share` of the way from one step to the next.
+   * Moves all objects to their poses at a `share` of the way from one step to the next.
    * @param {Frame} from
    * @param {Frame} to
    * @param {number} share
@@ -199,7 +199,7 @@ export class Stage {
       pose(robot.frustum, camera);
       const rides = this.ridden === index;
       if (rides) this.placeRig(to.row.subarray(camera, camera + POSE));
-      // Whoever rides a robot sees the border of its picture.
+      // The view of a robot shows the border of its picture.
       robot.frustum.visible = rides || (this.extras.frustums && this.view !== this.head.robots[index].name);
       middle.addScaledVector(one.fromArray(to.row, this.layout.links[index]), 1 / this.robots.length);
       robot.hands.forEach((hand, side) => this.showHand(hand, to.hand(index, side), from, pose, targets?.at(from.time + share * (to.time - from.time), index, side)));
@@ -243,14 +243,14 @@ export class Stage {
     arrow(contact, wrist, hand.contact, this.extras.forces);
   }
 
-  /** Looks with the free camera, or as a robot called `view` does. @param {string} view */
+  /** Selects the free camera, or the camera of the robot called `view`. @param {string} view */
   look(view) {
     this.view = view;
     this.controls.enabled = view === "free";
     this.stale = true;
   }
 
-  /** Draws, if anything has changed. Returns whether it has. */
+  /** Draws, if the scene or the view has changed. Returns true if so. */
   draw() {
     this.controls.update();
     const isStill = !this.stale && !this.isFine && this.coarseness > 1 && performance.now() - this.drawnAt > STILL_MS;
@@ -262,14 +262,14 @@ export class Stage {
     return !isStill;
   }
 
-  /** Returns the camera that looks now, as the place's size wants it. */
+  /** Returns the present camera, fitted to the size of the element. */
   camera() {
     const { clientWidth: width, clientHeight: height } = this.place;
     const robot = this.head.robots.find(({ name }) => name === this.view);
     const camera = robot ? this.head_camera : this.free;
     let wholePixels = height;
     if (robot) {
-      // The whole of its picture is seen, and beside or below it what the place has room for.
+      // The whole picture is visible, and beside or below it as much as the element has space for.
       const picturePixels = Math.min(this.pictureShare * height, (width * robot.camera.height) / robot.camera.width);
       // A camera looks along the middle of what it draws, whose upper end is not shown where the picture is at the top.
       if (this.pictureShare < 1) wholePixels = 2 * height - picturePixels;
@@ -279,7 +279,7 @@ export class Stage {
     return camera;
   }
 
-  /** Puts a headset's wearer in the place of a robot, or, for null, nobody. @param {number | null} robot */
+  /** Puts a headset's wearer in the place of a robot; null removes the wearer. @param {number | null} robot */
   ride(robot) {
     this.ridden = robot;
     this.rig.visible = robot !== null;
@@ -287,8 +287,8 @@ export class Stage {
   }
 
   /**
-   * Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is
-   * bent by a tilted camera.
+   * Moves the wearer's space to the eye of the robot, upright and in the robot's direction. A tilted camera thus
+   * does not tilt the wearer's view.
    * @param {Float32Array} pose
    */
   placeRig(pose) {
@@ -305,8 +305,8 @@ export class Stage {
   }
 
   /**
-   * Returns where a point of the world is seen: x to the right and y up, from -1 to 1 within the place; and
-   * tells whether it is ahead.
+   * Returns the place of a point of the world in the view: x to the right and y up, from -1 to 1 within the element. `ahead`
+   * is true if it is in front of the camera.
    * @param {Vector3} point
    */
   project(point) {
@@ -318,7 +318,7 @@ export class Stage {
   }
 
   /**
-   * Returns how far a point of the world moves where its picture moves by pixels to the right and down, and it goes away by metres.
+   * Returns the displacement of a point of the world whose picture moves by pixels to the right and down, and which moves away by metres.
    * @param {Vector3} point
    * @param {number} right
    * @param {number} down
@@ -334,7 +334,7 @@ export class Stage {
   }
 
   /**
-   * Returns the axis and angle, in the world, by which a ball turns that a pointer moves to the right and down, or round the line of sight.
+   * Returns the axis and angle, in the world, of a ball that a pointer turns to the right and down, or about the line of sight.
    * @param {number} right
    * @param {number} down
    * @param {number} round
@@ -343,7 +343,7 @@ export class Stage {
     return new Vector3(down, right, round).applyQuaternion(this.camera().quaternion);
   }
 
-  /** Gives back what a page has few of, where it draws one episode after another. */
+  /** Frees limited resources of the page, which may draw one episode after another. */
   leave() {
     this.sized.disconnect();
     this.controls.dispose();
@@ -351,7 +351,7 @@ export class Stage {
     this.renderer.forceContextLoss();
   }
 
-  /** Draws less, where drawing takes long: first no shadows, then fewer pixels. */
+  /** Simplifies slow drawing: first without shadows, then with fewer pixels. */
   simplify() {
     if (!this.light.casting.some(({ castShadow }) => castShadow)) {
       this.coarseness = Math.min(MOST_COARSENESS, this.coarseness * 1.5);
@@ -365,12 +365,12 @@ export class Stage {
   }
 }
 
-/** Frames over which it is judged whether drawing takes long. */
+/** Number of frames whose mean duration is compared with the limit. */
 const JUDGED_FRAMES = 20;
-/** A page in the background is not drawn, and so is not slow. */
+/** Minimum duration that means a page in the background, which does not count as slow. */
 const NOT_DRAWN_MS = 1000;
 
-/** A judge that says when drawing takes longer, over some frames, than `mostMs` a frame. */
+/** Detects drawing that takes longer than `mostMs` a frame on average. */
 export class Pace {
   /** @param {number} mostMs */
   constructor(mostMs) {
@@ -380,8 +380,8 @@ export class Pace {
   }
 
   /**
-   * Takes in that another frame came `ms` after the last. Returns whether they come too slowly, once for
-   * `JUDGED_FRAMES`.
+   * Counts a frame that came `ms` after the last one. Returns true if the last `JUDGED_FRAMES` frames were too
+   * slow.
    * @param {number} ms
    */
   isSlow(ms) {
@@ -395,7 +395,7 @@ export class Pace {
   }
 }
 
-/** Tells whether a processor draws in place of a graphics processor. */
+/** Returns true if software draws instead of a graphics processor. */
 function drawnBySoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
   if (!context) return false;
@@ -406,7 +406,7 @@ function drawnBySoftware() {
 }
 
 /**
- * Returns the edges of what a camera sees, which looks along -z with y up.
+ * Returns the edges of a camera's view volume. The camera looks along -z with y up.
  * @param {import("../message.js").CameraHead} camera
  */
 function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
@@ -417,7 +417,7 @@ function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
   return new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(ends.flat()), 3));
 }
 
-/** Makes a wrist's target: a ball, and axes that say how the hand is turned. */
+/** Makes a wrist's target: a ball, and axes that show the hand's orientation. */
 function ghostGroup() {
   const group = new Group();
   const material = new MeshBasicMaterial({ transparent: true, opacity: 0.55, depthTest: false });

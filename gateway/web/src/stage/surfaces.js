@@ -1,17 +1,17 @@
-// The shapes of a scene with their materials: one mesh for all parts of a carrier that look alike but for their colour.
+// The shapes of a scene with their materials: one mesh for all parts of a carrier that differ only in colour.
 
 import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial, MeshPhongMaterial, MeshPhysicalMaterial, Quaternion, SRGBColorSpace, Vector3 } from "three";
 import { PATTERNS, patternGlsl } from "./patterns.js";
 
-/** Alpha from which surfaces are solid, as in the server's images. */
+/** Minimum alpha of solid surfaces, like in the server's images. */
 const SOLID_ALPHA = 0.995;
-/** Alpha of texels from which a surface with holes is there. */
+/** Minimum alpha of texels at which a surface with holes is drawn. */
 const LEAST_ALPHA = 0.05;
-/** Limits of the factor by which an image's colours are multiplied, as in the server's images. */
+/** Limits of the factor on an image's colours, like in the server's images. */
 const [LEAST_MEAN, MOST_TINT] = [1e-6, 8];
-/** Roughness of surfaces that state nothing. */
+/** Roughness of surfaces without a stated one. */
 const USUAL_ROUGHNESS = 0.7;
-/** What surfaces have that state nothing. @type {import("../message.js").Gloss} */
+/** Gloss of surfaces without a stated one. @type {import("../message.js").Gloss} */
 const USUAL_GLOSS = { emission: 0, specular: 0.5, shininess: 0.5, roughness: null, metallic: 0 };
 /** Factor from shininess to the exponent of highlights. */
 const SHININESS = 128;
@@ -22,15 +22,15 @@ const SHININESS = 128;
 /** @typedef {Mesh<BufferGeometry, SurfaceMaterial>} Surface */
 
 /**
- * Makes the surfaces of scenes. With a file's lights, colours multiply and add up in the values of the file, as in the server's images;
- * otherwise they are linear light.
+ * Makes the surfaces of scenes. With a file's lights, colours multiply and add up in the values of the file, like in the server's images.
+ * Otherwise they are linear light.
  */
 export class Surfaces {
   /**
    * @param {import("./textures.js").Textures} textures
    * @param {number | null} shine Highlights of the file's lights as a share of their light; null without such lights.
-   * @param {boolean} reflects False where a processor draws, for which reflections take too long.
-   * @param {() => void} changed is called when an image has come.
+   * @param {boolean} reflects False without a graphics processor, because reflections would take too long.
+   * @param {() => void} changed called when an image has arrived.
    */
   constructor(textures, shine, reflects, changed) {
     this.textures = textures;
@@ -40,7 +40,7 @@ export class Surfaces {
   }
 
   /**
-   * Makes the surfaces of `parts`, with what carries each.
+   * Makes the surfaces of `parts`, with their carriers.
    * @param {Part[]} parts
    * @param {MeshNumbers[]} meshes
    * @returns {{ mesh: Surface, carrier: import("../message.js").Carrier }[]}
@@ -62,7 +62,7 @@ export class Surfaces {
     });
   }
 
-  /** Takes over a colour of the file. @param {import("../message.js").Rgb} rgb */
+  /** Converts a colour of the file. @param {import("../message.js").Rgb} rgb */
   own(rgb) {
     return this.shine === null ? new Color().setRGB(...rgb, SRGBColorSpace) : new Color(...rgb);
   }
@@ -77,7 +77,7 @@ export class Surfaces {
   }
 
   /**
-   * Makes the material of a part. What is blended keeps out as much light as in the server's images.
+   * Makes the material of a part. Blended parts block as much light as in the server's images.
    * @param {Part} part
    */
   material(part) {
@@ -131,7 +131,7 @@ export class Surfaces {
   }
 
   /**
-   * Covers a surface with an image. Until that has come, it has the mean colour.
+   * Covers a surface with an image. Until the image has arrived, it has the mean colour.
    * @param {SurfaceMaterial} material
    * @param {import("../message.js").SurfaceImage} image
    * @param {string[]} additions
@@ -141,7 +141,7 @@ export class Surfaces {
     patch(material, additions);
     const isCube = image.mapping.kind === "cube";
     const numbers = (/** @type {number | null} */ number) => (number === null ? null : this.textures.numbers(number));
-    // The lights of a file make no surface brighter than its image, and what it emits by a layer.
+    // The lights of a file make no surface brighter than its image plus the emission of its layer.
     const glow = image.emitted === null ? "" : " + totalEmissiveRadiance";
     const most = (/** @type {string} */ rgb) => (this.shine === null ? "" : `outgoingLight = min(outgoingLight, ${rgb}${glow});`);
     try {
@@ -192,7 +192,7 @@ export class Surfaces {
 }
 
 /**
- * Returns the roughness of a surface: as stated, or that of highlights as sharp as stated. Source: Walter et al. 2007, section 5.2.
+ * Returns the roughness of a surface: the stated one, or the one with equally sharp highlights. Source: Walter et al. 2007, section 5.2.
  * @param {import("../message.js").Gloss} gloss
  */
 function roughnessOf({ roughness, shininess }) {
@@ -201,7 +201,7 @@ function roughnessOf({ roughness, shininess }) {
   return (2 / (Math.max(shininess, 0) * SHININESS + 2)) ** 0.25;
 }
 
-/** Point that a mapping or a pattern is a function of: one that each corner has. */
+/** Attribute of each corner: the point that a mapping or a pattern is a function of. */
 const OF_MESH = "place";
 
 /**
@@ -243,8 +243,8 @@ function longestAxis({ positions }) {
 }
 
 /**
- * Returns what gives the point that the mapping or pattern of a part is a function of, from a point of its mesh; null where it is a
- * function of none, or of a point of the world.
+ * Returns the function from a point of a part's mesh to the point that its mapping or pattern depends on. Returns null if it depends
+ * on no point, or on a point of the world.
  * @param {Part} part
  * @param {MeshNumbers} mesh
  * @returns {((own: number[]) => number[]) | null}

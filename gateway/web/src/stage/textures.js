@@ -1,18 +1,18 @@
-// Images on surfaces, each asked for once by its hash. Browsers keep them, for later episodes in the same scene, too.
+// Images on surfaces. Each is requested once by its hash. Browsers also keep them for later episodes in the same scene.
 
 import { CubeTexture, LinearMipmapLinearFilter, NoColorSpace, RepeatWrapping, SRGBColorSpace, Texture } from "three";
 
-/** Samples of an image along the surface where it is seen at a slant. */
+/** Number of samples of an image along a surface that is seen at a slant. */
 const ANISOTROPY = 4;
 
-/** Asks the server for an image by its hash. @typedef {(hash: string) => Promise<Response>} TextureSource */
+/** Requests an image from the server by its hash. @typedef {(hash: string) => Promise<Response>} TextureSource */
 
 /** The images of one scene. */
 export class Textures {
   /**
    * @param {import("../message.js").TextureHead[]} heads
    * @param {TextureSource} source
-   * @param {boolean} isLinear True if values of images are colours of light as they are, false if they are sRGB.
+   * @param {boolean} isLinear True if values of images are used as colours of light directly, false if they are sRGB.
    */
   constructor(heads, source, isLinear) {
     this.heads = heads;
@@ -30,7 +30,7 @@ export class Textures {
   /** Returns an image of colours. @param {number} number */
   colour(number) { return this.flat(number, this.colours); }
 
-  /** Returns an image of numbers, which are no colours. @param {number} number */
+  /** Returns an image of numbers other than colours. @param {number} number */
   numbers(number) { return this.flat(number, NoColorSpace); }
 
   /** Returns the image of a cube, on six sides. @param {number} number */
@@ -90,7 +90,7 @@ export class Textures {
 }
 
 /**
- * Decodes an image, or a part of it, without any change of its values.
+ * Decodes an image, or a part of an image, without a change of its values.
  * @param {Blob} file
  * @param {[number, number, number, number]} [part]
  * @param {ImageBitmapOptions} [size]

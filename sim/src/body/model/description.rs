@@ -15,8 +15,7 @@ use crate::user_file::{MAX_TEXT_BYTES, read_text};
 pub(super) struct RobotDescription {
     /// The MJCF file, relative to the folder of the description.
     pub model: PathBuf,
-    /// Embedded robot that supplies the joints' effort, speed limit, armature and dry friction where
-    /// nothing else gives them.
+    /// Embedded robot that supplies missing efforts, speed limits, armatures and dry frictions of joints.
     pub like: Option<String>,
     /// Names of joints in the MJCF, by published name, where they differ.
     #[serde(default)]

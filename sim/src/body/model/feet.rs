@@ -66,8 +66,8 @@ pub(super) fn root_from_body(document: &Document, body: usize) -> DPose3 {
     }
 }
 
-/// Returns the smallest rotation from level to the plane of a sole, whose link has this rotation in the root.
-/// It is none if the sole is round or almost level.
+/// Returns the smallest rotation from level to the plane of a sole, for a link with this rotation in the
+/// root. It is 0 if the sole is round or almost level.
 fn sole_tilt(root_from_link: Rotation, geoms: &[Geom]) -> Rotation {
     let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
     let points_m: Vec<Vector> = colliding
@@ -99,7 +99,7 @@ fn sole_tilt(root_from_link: Rotation, geoms: &[Geom]) -> Rotation {
     if is_flat && tilt.angle_between(Rotation::IDENTITY) > MIN_TILT_RAD { tilt } else { Rotation::IDENTITY }
 }
 
-/// Returns points of a shape's surface, whose hull it is.
+/// Returns points of a shape's surface. The shape is their hull.
 fn surface_points_m(shape: &SharedShape) -> Vec<Vector> {
     match shape.as_typed_shape() {
         TypedShape::Cuboid(cuboid) => cuboid.to_trimesh().0,

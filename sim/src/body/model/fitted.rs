@@ -1,6 +1,6 @@
-//! A robot built by a description from third-party MJCF. Masses, inertias, geometry and ranges are those
-//! of the MJCF. Gains are the G1's, scaled to this robot's weight and size, whatever its actuators
-//! specify: the base controller relies on them.
+//! A robot built by a description from third-party MJCF. Masses, inertias, geometry and ranges are those of
+//! the MJCF. Gains are the G1's, scaled to this robot's weight and size, because the base controller relies
+//! on them. Those of its actuators are ignored.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -68,13 +68,13 @@ impl Fitting {
         self.refused.push(self.wrong(what));
     }
 
-    /// Returns all reasons with a last one.
+    /// Adds a last reason and returns all reasons.
     fn all_with(&mut self, error: SimError) -> SimError {
         self.refused.push(error);
         SimError::several(std::mem::take(&mut self.refused))
     }
 
-    /// Returns a value, or adds the reason for which there is none.
+    /// Returns a value, or adds the reason why there is none.
     fn keep<T>(&mut self, tried: Result<T, SimError>) -> Option<T> {
         tried.map_err(|error| self.refused.push(error)).ok()
     }
@@ -332,7 +332,7 @@ impl Fitting {
         }
     }
 
-    /// Checks that nothing but the legs' own joints is between pelvis and feet.
+    /// Checks that there are only the legs' own joints between pelvis and feet.
     fn check_legs(&mut self, document: &Document, tree: &BodyTree, joints: &[JointModel]) -> bool {
         let mut wrong = Vec::new();
         for leg in LEGS.map(|first| &joints[first..first + LEG_JOINTS]) {

@@ -33,8 +33,8 @@ pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec
     in_published_order(joints).map_err(|what| document.unsupported(what))
 }
 
-/// Returns the joints in published order, including rigid ones for those that the robot lacks. The text
-/// of an error says what would be right.
+/// Returns the joints in published order, including rigid ones for those that the robot lacks. The text of an
+/// error states the requirement.
 pub(super) fn in_published_order(mut found: Vec<JointModel>) -> Result<Vec<JointModel>, String> {
     let names = joint_names();
     if let Some(other) = found.iter().find(|joint| !names.contains(&joint.name)) {
@@ -69,9 +69,9 @@ fn check_legs(found: &[JointModel], names: &[String]) -> Result<(), String> {
     Err(format!("needs {joints} {}; {have}", lacking.join(", ")))
 }
 
-/// Returns the link that carries a joint of the published order; `joints` are those before it.
+/// Returns the link that carries a joint of the published order; `joints` are the earlier joints.
 fn carrier(joints: &[JointModel], index: usize) -> usize {
-    // The last of a group in the tree, whatever the order of its joints.
+    // The last joint of a group in the tree, for any order of its joints.
     let end = |first: usize, count: usize| {
         joints[first..first + count].iter().map(|joint| joint.link).max().unwrap_or_default()
     };

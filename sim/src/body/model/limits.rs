@@ -40,7 +40,7 @@ pub(super) fn limits_of_file(document: &Document) -> Result<BTreeMap<String, Fil
     Ok(found)
 }
 
-/// Returns the range of an actuator's efforts. That of a motor without a range of its own is the range of its
+/// Returns the range of an actuator's efforts. For a motor without such a range it is the range of its
 /// commands.
 fn effort_range_n_m(actuator: &Actuator) -> Option<[f64; 2]> {
     let commanded = || {
@@ -71,7 +71,7 @@ pub(super) struct JointSources<'a> {
     /// Name of the description in messages.
     pub file: &'a str,
     pub description: &'a RobotDescription,
-    /// Robot that supplies limits that nothing else gives.
+    /// Robot that supplies missing limits.
     pub like: Option<&'a RobotModel>,
     pub g1: &'a RobotModel,
 }
@@ -114,7 +114,7 @@ impl JointSources<'_> {
         };
         let given = described.effort_n_m.get(name).copied();
         let effort = given.or(of_file).or(like.as_ref().map(|like| like.effort_n_m));
-        // The joints without a limit are told together.
+        // The joints without a limit are reported together.
         let without = if wrong.is_empty() { 0.0 } else { 1.0 };
         (self.joint_model(joint, link, limits, effort.unwrap_or(without), like.as_ref()), wrong)
     }

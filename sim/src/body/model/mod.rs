@@ -151,7 +151,7 @@ impl RobotModel {
         if self.joints[pitch].link > self.joints[roll].link { pitch } else { roll }
     }
 
-    /// Returns the first link of an arm, whatever the order of its joints; the pelvis without an arm.
+    /// Returns the first link of an arm, for any order of its joints; the pelvis if there is no arm.
     pub fn shoulder(&self, side: Side) -> usize {
         let arm = self.joints[ARMS[side]..][..ARM_JOINTS].iter().filter(|joint| joint.exists());
         arm.map(|joint| joint.link).min().unwrap_or_default()

@@ -6,7 +6,7 @@ use super::{RobotModel, fitted};
 use crate::mjcf::Document;
 use crate::{SimError, assets};
 
-/// A robot as it was read.
+/// A robot as read from its file.
 #[derive(Debug)]
 pub struct RobotSource {
     pub model: RobotModel,

@@ -52,7 +52,7 @@ impl Mask {
 /// A collider at its pose in this step.
 pub struct Surface {
     pub collider: Collider,
-    /// The link that carries it; `None` if nothing moves that link.
+    /// The link that carries the collider; `None` if that link cannot move.
     pub body: Option<LinkId>,
     /// True if the shape rolls on features that Parry treats as edges and corners. Balls are not round
     /// in this sense: Parry finds their point of contact exactly.
@@ -71,9 +71,9 @@ pub struct Surface {
     pub sleeps_there: bool,
 }
 
-/// Distance by whose whole multiples the shape of an endless collider is moved. The shape has to extend
-/// farther than this beyond what it meets. Between two moves it stays still, so that contact points
-/// continue those of the step before.
+/// Step of the places to which the shape of an endless collider is moved. The shape extends farther than one
+/// step beyond what it meets. Between two moves it stays still, so that contact points continue those of the
+/// step before.
 const TILE_M: f64 = 32.0;
 /// Half extent of an endless collider's bounds.
 const ENDLESS_M: f64 = 1e6;
@@ -130,7 +130,7 @@ impl Surface {
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
     }
 
-    /// Returns true if nothing moves the surface, or its body sleeps.
+    /// Returns true if the surface cannot move, or its body sleeps.
     pub fn is_still(&self, trees: &Trees) -> bool {
         self.body.is_none_or(|link| trees.all[link.tree.index()].is_asleep())
     }

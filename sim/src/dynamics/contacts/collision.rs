@@ -31,7 +31,7 @@ use crate::dynamics::{DPose3, DVec3};
 /// A cylinder that rolled at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets other
 /// corners in every step and trembles.
 const ROUND_TURNS_RAD: f64 = 0.001;
-/// Two faces are in full contact if no point is deeper than their corners by more than this.
+/// Maximum excess of a point's depth over the depth of the corners in a full contact of two faces.
 const FACE_M: f32 = 0.001;
 
 #[derive(Default)]
@@ -78,7 +78,7 @@ impl Collision {
         self.near.keep_colliders_apart(a, b);
     }
 
-    /// Lets two colliders touch whatever their masks, with this friction between them.
+    /// Lets two colliders touch regardless of their masks, with this friction between them.
     pub fn let_touch(&mut self, a: ColliderId, b: ColliderId, friction: Friction) {
         let pair = [a.min(b), a.max(b)];
         self.near.let_touch(pair);
@@ -108,7 +108,7 @@ impl Collision {
         self.surfaces.iter_mut().for_each(|surface| surface.sleeps_there = false);
     }
 
-    /// Returns the trees that carry two colliders; `None` for one that nothing moves.
+    /// Returns the trees that carry two colliders; `None` for a collider that cannot move.
     pub fn trees_of(&self, colliders: [ColliderId; 2]) -> [Option<TreeId>; 2] {
         colliders.map(|id| self.surfaces[id.index()].body.map(|body| body.tree))
     }

@@ -334,7 +334,7 @@ fn propped<const N: usize>(inverse_mass: f64, terms: &Terms<N>) -> (f64, [f64; 2
 /// Share of the least inverse mass below which an inverse mass is rounding error.
 const SMALLEST_SHARE: f64 = 1e-9;
 
-/// Inverts an inverse mass; 0 if nothing can move.
+/// Inverts an inverse mass; 0 if no body can move.
 fn inverse(inverse_mass: f64) -> f64 {
     if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }

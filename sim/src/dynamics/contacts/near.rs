@@ -12,8 +12,8 @@ use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Default)]
 pub struct NearPairs {
-    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that
-    /// could not. The latter depend on the past, so nothing else may depend on them.
+    /// Pairs in order, the smaller collider first. They include all pairs that could touch in this step, and
+    /// some that could not. The latter depend on the past, so no result may depend on them.
     pub pairs: Vec<[ColliderId; 2]>,
     apart: Apart,
     broad_phase: BroadPhaseBvh,

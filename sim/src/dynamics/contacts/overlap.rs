@@ -15,11 +15,11 @@ use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeature
 
 /// Overlap along the normal below which the result is always close to the depth.
 const DEEP_M: f32 = 0.005;
-/// Number of outermost points that are remembered, and the overlap by which a normal must exceed the least one
-/// at these points to be left out. It is far above rounding.
+/// Number of outermost points that are remembered. A normal is left out if its overlap exceeds the least
+/// overlap at these points by `CERTAINLY_M`, which is far above rounding.
 const REMEMBERED: usize = 16;
 const CERTAINLY_M: f32 = 0.0001;
-/// Difference in overlap that a replacement normal must win by.
+/// Minimum difference in overlap at which another normal replaces the present one.
 const CLEARLY_M: f32 = 0.001;
 
 /// Two convex shapes, the second in the frame of the first.
@@ -78,8 +78,9 @@ impl<'a> Overlap<'a> {
         of_a.chain(of_b).chain(last)
     }
 
-    /// Returns the first of the least overlaps along normals. The search for outermost points is slow for hulls
-    /// of many corners. It is left out where points that were found for other normals already overlap by more.
+    /// Returns the least overlap along the normals; of equal ones, the first. The search for outermost points
+    /// is slow for hulls of many corners. A normal is skipped if points that were found for other normals
+    /// already overlap by more.
     fn least(&self, normals: impl Iterator<Item = Vector>) -> Option<Along> {
         let mut known: [[Vector; 2]; REMEMBERED] = Default::default();
         let mut found = 0;

@@ -17,7 +17,7 @@ pub struct JointRows {
     all: Vec<JointRow>,
     /// Range of rows of each lot of similar trees.
     of_alike: Vec<Range<usize>>,
-    /// Columns within a tree, and Y in them, of all rows.
+    /// Columns within a tree and entries of Y there, for all rows.
     column: Vec<u16>,
     y: Vec<Abreast>,
     drives: Vec<BoundedDrive>,
@@ -68,8 +68,7 @@ struct JointRange {
 /// Extra speed (rad/s or m/s) for deciding on a row for the range. A joint without other rows gets one
 /// at first only if it could reach an end when moving this much faster.
 const NEAR_RANGE: f64 = 10.0;
-/// Overshoot (rad or m) beyond the range from which on a joint without a row gets one, and the step is
-/// repeated.
+/// Overshoot (rad or m) beyond the range at which a joint without a row gets one, and the step is repeated.
 const MAX_OVERSHOOT: f64 = 0.01;
 
 impl Tree {

@@ -52,8 +52,8 @@ struct Block {
     remembered: DVec3,
 }
 
-/// Share of its trace added to the diagonal of a block's inverse mass, which keeps rows solvable that
-/// nothing can move.
+/// Share of its trace added to the diagonal of a block's inverse mass. It keeps rows solvable if no body can
+/// move along them.
 const REGULARISATION: f64 = 1e-9;
 
 impl Equalities {

@@ -19,7 +19,7 @@ use super::trees::tree::Tree;
 
 /// Share of its limit that a drive must have exerted in the last step to be a row in the next.
 const NEAR_LIMIT: f64 = 0.8;
-/// Share of its speed limit from which on a drive pushes less.
+/// Share of its speed limit above which a drive pushes less.
 const SLACKENS: f64 = 0.8;
 /// Relative tolerance to which efforts respect their limits.
 const TOLERANCE: f64 = 1e-9;

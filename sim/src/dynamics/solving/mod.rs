@@ -19,9 +19,9 @@ use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::{LinkId, Trees};
 
-/// Velocity (rad/s or m/s) removed in the last sweep from which on more sweeps follow, and their maximum
-/// number. Only the ends of ranges and motors that are turned too fast count. An example is a heavy body
-/// that presses a light link against its stop.
+/// Velocity (rad/s or m/s) removed in the last sweep above which more sweeps follow, and their maximum
+/// number. Only the ends of ranges and motors that are turned too fast count. An example is a heavy body that
+/// presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
 /// Number of these extra sweeps after which contacts change only by a share of their full update.
@@ -29,14 +29,14 @@ const MORE_SWEEPS: usize = 32;
 /// undoing the one before.
 const WHOLE_SWEEPS: usize = 8;
 const DAMPED_SHARE: f64 = 0.5;
-/// Penetration depth from which on as many sweeps are added, for example when a heavy body presses a
+/// Penetration depth above which the same number of sweeps is added, for example when a heavy body presses a
 /// light one into the floor.
 const DEEP_M: f64 = 0.01;
-/// Penetration depth from which on a contact is rigid.
+/// Penetration depth above which a contact is rigid.
 const RIGID_M: f64 = 0.02;
 /// Lower bound of the inverse mass of a contact's normal, as a share of the links' own inverse masses.
 const MIN_SHARE: f64 = 0.01;
-/// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
+/// Energy (J) removed by the relaxing sweeps above which more energy may be left.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
@@ -275,7 +275,7 @@ impl WithSimd for Gathering<'_> {
 /// Work of the contacts of a heap in a step.
 #[derive(Clone, Copy, Default)]
 struct HeapWork {
-    /// Twice the work of their impulses, and twice the work that these would do on bodies at rest.
+    /// Twice the work of their impulses, and twice the work of the same impulses on bodies at rest.
     twice_j: f64,
     own_j: f64,
 }
@@ -295,9 +295,9 @@ fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
-/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses
-/// a finger that is stretched against its stop with 300 times its weight into something. Without this,
-/// the finger would stay 2 cm deep.
+/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses a
+/// finger that is stretched against its stop into an obstacle, with 300 times the finger's weight. Without
+/// this, the finger would stay 2 cm deep.
 fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }

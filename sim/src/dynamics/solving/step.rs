@@ -15,7 +15,7 @@ impl Dynamics {
     ///
     /// # Errors
     ///
-    /// Returns [`Diverged`] if a velocity is no longer finite; all state then is as it was, but bodies may
+    /// Returns [`Diverged`] if a velocity is no longer finite. All state is then unchanged, but bodies may
     /// have woken.
     pub fn step(&mut self) -> Result<(), Diverged> {
         self.collision.place_all(&self.trees, &self.settings);

@@ -47,7 +47,7 @@ impl Bench {
         });
     }
 
-    /// Adds an endless floor at z = 0, of which a part of 80 m exists at a time.
+    /// Adds an endless floor at z = 0. A part of 80 m exists at a time.
     pub fn add_endless_floor(&mut self, friction: Friction) {
         let shape = SharedShape::cuboid(40.0, 40.0, 1.0);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -1.0));

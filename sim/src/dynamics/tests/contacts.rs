@@ -1,4 +1,4 @@
-//! Stacks, unequal masses, impacts, and what contacts report.
+//! Tests of stacks, unequal masses, impacts, and reports of contacts.
 
 use rapier3d::glamx::{DPose3, DQuat, DVec3};
 
@@ -129,7 +129,7 @@ fn dynamics_contacts_report_the_weight() {
     assert_eq!(bench.dynamics.solver.touches.len(), 4);
 }
 
-/// An endless floor carries a body at any distance just as it does at its centre.
+/// An endless floor carries a body at any distance exactly like at its centre.
 #[test]
 fn dynamics_endless_floor_carries_everywhere() {
     let settled = |x_m: f64| {
@@ -144,7 +144,7 @@ fn dynamics_endless_floor_carries_everywhere() {
         place_m.x - x_m
     };
     let slid_m = settled(0.0);
-    // From 15.9 m it slides from one part of the floor to the next.
+    // At 15.9 m it slides from one part of the floor to the next.
     for x_m in [15.9, 60.0, -700.0] {
         assert!((settled(x_m) - slid_m).abs() < 1e-3, "{} {slid_m}", settled(x_m));
     }

@@ -86,15 +86,16 @@ fn saturated_chain(height_m: f64, armature: f64, steps: usize) -> (usize, usize)
     (limited, checked)
 }
 
-/// Checks that the reported efforts match inverse dynamics. Returns false if something touches or the
-/// tree is fast, where no comparison is possible.
+/// Checks that the reported efforts match inverse dynamics. Returns false if bodies touch or the tree is
+/// fast, where no comparison is possible.
 fn check_efforts(
     bench: &Bench,
     id: super::super::TreeId,
     at: &super::super::TreeState,
     before: &[f64],
 ) -> bool {
-    // For a fast tree, energy that the integration made is removed (see `energy`), which no drive did.
+    // Of a fast tree, spurious energy of the integration is removed (see `energy`), which is no effort of a
+    // drive.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.solver.touches.is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return false;
@@ -112,7 +113,7 @@ fn check_efforts(
     true
 }
 
-/// A drive holds a load against gravity with the limit just above it, and yields just below.
+/// A drive holds a load against gravity if its limit is just above the load, and yields if it is just below.
 #[test]
 fn dynamics_drive_gives_way_beyond_its_limit() {
     let mut mass = Mass::of_box(2.0, DVec3::splat(0.05));
@@ -143,7 +144,7 @@ fn motor(inertia_kg_m2: f64) -> (Bench, super::super::TreeId) {
 
 /// Returns the effort of a motor with this feedforward in a step that begins at this speed.
 fn effort_at(speed: f64, push_n_m: f64) -> f64 {
-    // So heavy that the speed is the same at the end of the step.
+    // The flywheel is so heavy that its speed is the same at the end of the step.
     let (mut bench, id) = motor(1e6);
     bench.dynamics.tree_mut(id).set_joint(0, 0.0, speed);
     bench.dynamics.tree_mut(id).drive(0, Drive { feedforward: push_n_m, ..Drive::NONE });

@@ -1,4 +1,5 @@
-//! Bit-identical reruns, whatever Rapier's broad phase has seen before, and errors for non-finite numbers.
+//! Tests of bit-identical reruns, for any history of Rapier's broad phase, and of errors for non-finite
+//! numbers.
 
 use rapier3d::glamx::{DPose3, DVec3};
 use rapier3d::prelude::SharedShape;

@@ -96,7 +96,8 @@ fn dofs(joint: &Joint) -> usize {
 fn check(root: Joint, seed: u64) {
     let mut random = Random(seed);
     let mut tree = bush(root, &mut random);
-    // Slow, and driven gently: energy that the integration made is removed from a fast tree (see `energy`).
+    // The motion is slow and gently driven, because energy that the integration made is removed from a fast
+    // tree (see `energy`).
     stir(&mut tree, &mut random, 2.0);
     let mut wanted = vec![0.0; tree.dofs()];
     for link in 0..tree.links().len() {

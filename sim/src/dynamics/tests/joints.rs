@@ -225,8 +225,8 @@ fn dynamics_trees_that_cannot_be_are_named() {
     assert!(Tree::new("pair", two).err().unwrap().to_string().contains("only the first link"));
 }
 
-/// A heavy ball strikes a finger that is far from the end of its range. The finger stops at that end,
-/// and the ball on it.
+/// A heavy ball strikes a finger that is far from the end of its range. The finger stops at that end, and the
+/// ball stops on the finger.
 #[test]
 fn dynamics_blow_does_not_drive_a_light_link_beyond_its_range() {
     for speed_m_s in [1.0, 3.0, 6.0] {

@@ -14,8 +14,8 @@ use super::bench::{Bench, Random, lone, sliding};
 const NEAR_M: f32 = 0.006;
 /// Depths below this are left as Parry reports them.
 const SHALLOW_M: f32 = 0.005;
-/// Tolerance for comparing depths with `least_m`, whose grid of directions is coarse. Corrected depths
-/// come from faces alone and miss that of two edges by as much.
+/// Tolerance for comparing depths with `least_m`, whose grid of directions is coarse. Corrected depths come
+/// from faces alone. Where two edges meet, they are wrong by as much.
 const COARSE_M: f32 = 0.006;
 
 /// Builds a robot's foot: the shell of `sim/assets/robots/g1_dex3/robot.xml`.

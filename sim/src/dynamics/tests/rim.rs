@@ -74,7 +74,7 @@ fn dynamics_bottle_that_whirls_on_its_rim_gains_nothing() {
     }
 }
 
-/// With the friction of its file the bottle comes to rest upright, whichever way it turned.
+/// With the friction of its file the bottle comes to rest upright from every orientation.
 #[test]
 fn dynamics_bottle_on_its_rim_comes_to_rest() {
     let friction = Friction {

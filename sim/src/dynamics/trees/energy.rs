@@ -21,8 +21,8 @@ use super::link::Joint;
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
-/// Speed of a joint or of the base, rad per step, above which a tree counts as fast; slower trees are
-/// unchanged.
+/// Speed of a joint or of the base, rad per step, above which a tree counts as fast. Slower trees are not
+/// changed.
 pub(in crate::dynamics) const FAST_RAD: f64 = 0.05;
 
 /// Energy and momentum that a step ought to end with.

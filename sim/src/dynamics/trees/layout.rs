@@ -9,7 +9,7 @@ use super::link::Link;
 pub struct Layout {
     /// First degree of freedom of each link's joint; for a fixed joint that of the next moving link.
     pub first_dof: Vec<usize>,
-    /// Last degree of freedom on the path to each link; `None` if nothing moves it.
+    /// Last degree of freedom on the path to each link; `None` if the link cannot move.
     pub last_dof: Vec<Option<usize>>,
     pub link_of: Vec<usize>,
     /// For each link, the first link that it is rigidly connected to, and the same for the parent of

@@ -134,7 +134,7 @@ impl Trees {
         }
     }
 
-    /// Returns true if something moves a link; otherwise it is part of the world.
+    /// Returns true if a link can move. Otherwise it is part of the world.
     pub fn moves(&self, link: LinkId) -> bool {
         self.all[link.tree.index()].layout.last_dof[link.link].is_some()
     }

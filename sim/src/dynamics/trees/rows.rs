@@ -95,7 +95,7 @@ impl<const N: usize> ConstraintRows<N> {
         self.column.clear();
     }
 
-    /// Returns the number of columns of the group so far.
+    /// Returns the number of columns that the group has now.
     pub fn columns(&self) -> usize {
         self.column.len()
     }
@@ -185,7 +185,7 @@ impl<const N: usize> ConstraintRows<N> {
             self.blocks.push(RowBlock { y, nothing: Quad::default(), first });
             return SIDE;
         }
-        // Filled in place: moving data just written number by number would stall the processor.
+        // The rows are filled in place: moving data just written number by number would stall the processor.
         self.blocks.push(RowBlock { y: [Quad::default(); N], nothing: Quad([-0.0; SIDE]), first });
         if let Some(block) = self.blocks.last_mut() {
             for (side, y) in (begin..).zip(y) {

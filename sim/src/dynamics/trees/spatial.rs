@@ -232,7 +232,7 @@ pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-/// Converts the pose to single precision, which colliders and everything outside of dynamics use.
+/// Converts the pose to single precision, which colliders and all modules outside of dynamics use.
 pub(crate) fn rounded(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

@@ -73,7 +73,7 @@ impl Tree {
     ///
     /// # Errors
     ///
-    /// Returns a [`TreeError`] if the links do not form a tree or a joint moves nothing that has inertia.
+    /// Returns a [`TreeError`] if the links do not form a tree or a joint moves no inertia.
     pub fn new(name: &str, links: Vec<Link>) -> Result<Tree, TreeError> {
         check(name, &links)?;
         let layout = Layout::of(&links);

@@ -1,5 +1,5 @@
-//! The policy at a robot's motors, as a program for a real G1 runs it: with its own gains, and with nothing
-//! under it.
+//! The policy that drives all of a robot's motors, as in a program for a real G1: with the policy's gains,
+//! and without a base controller.
 
 use std::sync::Arc;
 

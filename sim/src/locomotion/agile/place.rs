@@ -52,8 +52,8 @@ impl ReferencePlace {
         }
     }
 
-    /// Moves the reference by a command (forward m/s, left m/s, turning rad/s). Returns the velocity
-    /// that keeps up with it.
+    /// Moves the reference by a command (forward m/s, left m/s, turning rad/s). Returns the velocity at which
+    /// the robot keeps up with the reference.
     pub(super) fn follow(&mut self, world_from_pelvis: Pose, command: [f32; 3], dt_s: f32) -> [f32; 3] {
         let moving = command != [0.0; 3];
         let (leash_m, leash_rad) = if moving { (LEASH_M, LEASH_RAD) } else { (f32::MAX, PI) };

@@ -13,10 +13,10 @@ use crate::body::{Acceleration, BodyEstimate, Effort, JOINTS, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// Maximum ratio of horizontal to vertical force, which friction surely provides.
+/// Maximum ratio of horizontal to vertical force that is used. Friction provides it with certainty.
 const FRICTION_USED: f32 = 0.43;
-/// Maximum moment about the vertical that friction at a foot's corners holds is 15 N m. It is less if
-/// the pressure is at toe or heel, where the corners are close.
+/// Maximum moment about the vertical that a foot is given. Friction at its corners holds 15 N m. It holds
+/// less if the pressure is at toe or heel, where the corners are close.
 const LARGEST_TURN_N_M: f32 = 14.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Inertia of trunk and arms about the vertical.

@@ -1,5 +1,5 @@
-//! Planning of the rest of a step: the present centre of pressure, the foothold of the swinging foot,
-//! and the pace.
+//! Planning of the remaining part of a step: the present centre of pressure, the foothold of the swinging
+//! foot, and the pace.
 
 #[cfg(test)]
 mod tests;
@@ -22,7 +22,8 @@ const EASY_SPREAD_M: [f32; 2] = [0.12, 0.46];
 /// the foot lifts, and it meets the ground 15 cm before its foothold. Tuned on punches at shoulders and
 /// elbows, seeds 2000-2159.
 const FASTER: [f32; 4] = [1.175, 1.35, 1.525, 1.7];
-/// Strain per pace above one, and per distance between the needed foothold and the nearest within reach.
+/// Strain per unit of the pace factor above 1. `MISS` is the strain per distance between the needed foothold
+/// and the nearest one within reach.
 const HURRY_M: f32 = 0.01;
 const MISS: f32 = 0.1;
 /// Maximum distance of the centre of pressure from the sole's centre: along and across the foot.

@@ -7,7 +7,7 @@ use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
-/// A robot and its loads as one body: each load is a mass in the palm, whose swing does not push the robot.
+/// A robot and its loads as one body. Each load is a mass in the palm; its swing does not push the robot.
 pub(super) struct LadenRobot {
     carried_kg: Sides<f32>,
     pub mass_kg: f32,
@@ -36,7 +36,7 @@ pub(super) struct Load {
     pub moment_n_m: Vector,
     /// Centre of pressure of a robot at rest: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
-    /// The same without the push: the common centre of mass of the robot and its loads.
+    /// Centre of pressure without the push: the common centre of mass of the robot and its loads.
     pub weights_point_m: Vector,
     /// Velocity of the balance point due to changes of the push.
     pub balance_point_m_s: Vector,
@@ -52,7 +52,7 @@ pub(super) struct Load {
 const PUSH_LEVER_M: f32 = 0.19;
 /// Weight below which a load counts as arm motion and friction.
 const DEAD_ZONE_N: f32 = 6.0;
-/// Maximum moment about the vertical that is fed forward, as much as a foot can hold.
+/// Maximum moment about the vertical that is fed forward, which is a foot's limit.
 const LARGEST_TURN_N_M: f32 = 20.0;
 /// Reduction of that maximum if the feet hold the moment by pushing in opposite directions.
 const TURN_LEFT_OUT_N_M: f32 = 10.0;
@@ -148,7 +148,7 @@ mod tests {
         );
     }
 
-    /// A robot at rest swings 3 kg in each hand forward: everything that moves shares the momentum.
+    /// A robot at rest swings 3 kg in each hand forward. All moving parts share the momentum.
     #[test]
     fn what_swings_in_the_hands_belongs_to_the_robot() {
         let mut body = Posed::standing().body();

@@ -34,9 +34,9 @@ pub(super) struct ObservedPush {
 
 /// A push split by its path into the robot.
 pub(super) struct SplitPush {
-    /// The part that does not come through hands that hold something; horizontal.
+    /// The horizontal part that does not come through hands with an object.
     pub rest: ObservedPush,
-    /// The part through the hands, as far as the robot withstands it; horizontal.
+    /// The horizontal part through the hands that the robot withstands.
     pub hands_m_s2: Vector,
     /// Height of the palms over the centre of mass.
     pub hands_lever_m: f32,
@@ -45,7 +45,7 @@ pub(super) struct SplitPush {
 }
 
 impl From<ObservedPush> for SplitPush {
-    /// Converts the push on a robot whose hands hold nothing.
+    /// Converts the push on a robot with empty hands.
     fn from(rest: ObservedPush) -> SplitPush {
         SplitPush { rest, hands_m_s2: Vector::ZERO, hands_lever_m: 0.0, yield_share: 0.0 }
     }
@@ -131,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Fingers close on a load: 50 N on 34 kg within a second, then suddenly none.
+    /// Fingers close on a load: 50 N on 34 kg within a second, then suddenly 0 N.
     #[test]
     fn a_growing_pull_is_found_as_it_grows_and_its_end_soon() {
         let pull_m_s2 = |time_s: f32| Vector::X * if time_s < 1.0 { 1.5 * time_s } else { 0.0 };

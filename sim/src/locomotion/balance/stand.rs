@@ -27,7 +27,7 @@ pub(super) use place::StandingPlace;
 /// Maximum distance of the centre of mass, loads included, from the middle of the feet before the pelvis
 /// shifts.
 const COM_ZONE_M: f32 = 0.0435;
-/// The same for a robot that comes to rest after walking, which settles nearer to its present position.
+/// This distance for a robot that comes to rest after walking, which settles nearer to its present position.
 const RESTING_ZONE_M: f32 = 0.01;
 /// Maximum distance of the balance point from the middle of the feet that the feet hold alone; the
 /// pelvis leans against the rest of a push. Hands that come down on a table push the robot back, and
@@ -53,7 +53,7 @@ const FARTHER_ASIDE_M: f32 = 0.025;
 /// joint friction.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
-/// Zone of the centre of mass of a robot that holds something with partners: smaller, because the feet
+/// Zone of the centre of mass of a robot that holds an object with partners. It is smaller, because the feet
 /// have to hold the partners' pull.
 const HELD_ZONE_M: f32 = 0.028;
 /// Yielding to partners. Beyond this pull of a shared load on its hands, a robot moves along the pull.

@@ -48,8 +48,8 @@ const RETURN_RAD_S: f32 = 0.4;
 /// robots, seeds 2600-2799.
 const SWAYING_RAD_S: f32 = 1.0;
 const LARGEST_SPIN_TURN_RAD: f32 = 0.8;
-/// Velocity error that indicates a blow: the robot then steps to stand, not to go on. Tuned on the same
-/// punches.
+/// Velocity error that indicates a blow. The robot then steps to come to a stand, not to walk on. Tuned on
+/// the same punches.
 const STRAYING_M_S: f32 = 0.6;
 /// Averaging time of the pelvis's facing direction. The pelvis sways about the vertical with every step.
 const FACING_TIME_S: f32 = 0.2;

@@ -16,7 +16,7 @@ pub(super) const AIR_S: f32 = 0.93 * SWING_S;
 const HEIGHT_M: f32 = 0.044;
 /// Downward speed of a foot that has not met the ground.
 const PROBING_M_S: f32 = 0.25;
-/// Remaining time from which on the goal is fixed.
+/// Remaining time below which the goal is fixed.
 const MIN_REMAINING_S: f32 = 0.03;
 const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
 /// Maximum displacement of a foot at rest in the time T, divided by T^2.
@@ -29,7 +29,7 @@ const DAMPING_1_S: f32 = 35.0;
 pub(super) struct Swing {
     from: Pose,
     to: Pose,
-    /// The path along the ground; the lift is added to it.
+    /// The path along the ground, without the lift.
     position_m: Vector,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,

@@ -58,7 +58,7 @@ impl Document {
         geoms.filter(|(_, geom, _)| geom.type_ == GeomType::Mesh)
     }
 
-    /// Returns true if a geom contributes mass or inertia to something that moves.
+    /// Returns true if a geom contributes mass or inertia to a moving body.
     fn weighs(&self, body: usize, geom: &Geom) -> bool {
         let mut above = std::iter::successors(Some(body), |body| self.model.bodies[*body].parent);
         self.takes_mass_of_geoms(body)

@@ -29,8 +29,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Normals at the corners of each triangle; empty if the file gives none.
     pub corner_normal: Vec<[Vector; 3]>,
-    /// Texture coordinates at the corners of each triangle, to the right and down from an image's top left
-    /// corner, of which 1 is the opposite one; empty if the file gives none.
+    /// Texture coordinates at the corners of each triangle: 0 at an image's top left corner, 1 at the right
+    /// or lower edge. Empty if the file gives none.
     pub corner_uv: Vec<[[f32; 2]; 3]>,
     /// True if mass and inertia are those of the volume inside the triangles, and not of the hull.
     pub weighs_exactly: bool,
@@ -48,8 +48,8 @@ impl PartialEq for Mesh {
     }
 }
 
-/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states, and what only concerns
-/// images.
+/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states, and data that only images
+/// use.
 impl fmt::Debug for Mesh {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Mesh { vertices_m, triangles, .. } = self;
@@ -161,7 +161,7 @@ pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes(path, MAX_FILE_BYTES)
 }
 
-/// Refuses a file whose extension names no kind of mesh, whether it is there or not.
+/// Refuses a file whose extension is not that of a mesh, even if the file is missing.
 fn check_kind(path: &Path) -> Result<(), SimError> {
     match kind(path).as_str() {
         "obj" | "stl" | "msh" => Ok(()),
@@ -359,7 +359,7 @@ mod tests {
         }
     }
 
-    /// A triangle whose corners have texture coordinates and normals of their own, and one without.
+    /// One triangle has corners with their own texture coordinates and normals, and the other has none.
     #[test]
     fn corners_have_the_texture_coordinates_and_normals_of_their_file() {
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.25\nvt 1 0\nvn 0 0 2\nvn 0 2 2\n\

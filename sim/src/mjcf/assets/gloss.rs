@@ -43,11 +43,11 @@ impl Default for Gloss {
     }
 }
 
-/// Least roughness; less would be a mirror.
+/// Minimum roughness; a smoother surface would be a mirror.
 pub const MIN_ROUGHNESS: f32 = 0.05;
 /// Factor from shininess to the exponent of highlights.
 pub const SHININESS: f32 = 128.0;
-/// Exponent of the highlights of materials that state nothing.
+/// Exponent of the highlights of materials without an exponent.
 pub const USUAL_EXPONENT: f32 = 64.0;
 
 impl Gloss {
@@ -87,7 +87,7 @@ impl Glosses {
             let stated = |attribute: &str| -> Option<f32> {
                 classes.stated(&node, attribute).and_then(|text| text.trim().parse().ok())
             };
-            // MuJoCo's own value, -1, states nothing.
+            // MuJoCo's default, -1, counts as not stated.
             let amount = |attribute: &str| stated(attribute).filter(|value| *value >= 0.0);
             let has_layer = |roles: &[&str]| {
                 let mut layers = node.children().filter(|child| child.has_tag_name("layer"));

@@ -1,4 +1,4 @@
-//! Layers of materials: textures with roles, put together to one image each for colour, gloss, relief and
+//! Layers of materials: textures with roles, combined into one image each for colour, gloss, relief and
 //! emitted light.
 
 use std::collections::BTreeMap;
@@ -10,7 +10,8 @@ use super::texture::{TexelMeaning, Texture};
 use crate::SimError;
 use crate::mjcf::Document;
 
-/// Roles whose texture gives a material's images their places, the first that there is.
+/// Roles of textures that determine the places of a material's images. The first role that the material has
+/// counts.
 const PLACING: [&str; 9] =
     ["rgb", "rgba", "orm", "roughness", "metallic", "normal", "opacity", "emissive", "occlusion"];
 

@@ -29,16 +29,16 @@ pub struct SurfaceImage {
 /// Mapping from points of a geom's surface, in the geom's frame, to an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TextureMapping {
-    /// By the texture coordinates of the mesh's corners.
+    /// Mapping by the texture coordinates of the mesh's corners.
     Corners,
-    /// Along z: `scale_1_m * (point - centre_m) - 0.5` in x and y are the coordinates to the right and down,
-    /// of which a whole number more is the same place.
+    /// Along z: `scale_1_m * (point - centre_m) - 0.5` in x and y are the coordinates to the right and down.
+    /// The image repeats at every whole number.
     Along { scale_1_m: [f32; 2], centre_m: [f32; 2] },
     /// Onto a cube whose six faces show the image, in the direction `scale_1_m * (point - centre_m)`.
     Cube { scale_1_m: Vector, centre_m: Vector },
 }
 
-/// Shape of a geom, as far as mappings depend on it.
+/// Size of a geom, for mappings that depend on it.
 pub(in crate::mjcf) struct MappedShape {
     /// Half the size along each axis; 0 where a plane is unbounded.
     pub half_m: Vector,

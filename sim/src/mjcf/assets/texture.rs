@@ -26,7 +26,7 @@ impl Eq for Texture {}
 pub struct TextureLevel {
     pub width: usize,
     pub height: usize,
-    /// Width and height once more.
+    /// The same width and height as floating-point numbers.
     pub size_px: [f32; 2],
     /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six
     /// images, all of them in the order +x, -x, +y, -y, +z, -z.

@@ -1,4 +1,4 @@
-//! Pairs of geoms that touch whatever their masks say.
+//! Pairs of geoms that touch regardless of their masks.
 
 use crate::SimError;
 use crate::dynamics::{Directions, Friction};
@@ -10,7 +10,7 @@ use crate::mjcf::text::stated::Classes;
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeomPair {
     pub geoms: [String; 2],
-    /// Friction between the two, whatever their own.
+    /// Friction between the two, which replaces their own.
     pub friction: Friction,
 }
 

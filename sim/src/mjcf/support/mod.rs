@@ -51,7 +51,7 @@ pub(super) enum Takes {
         most: usize,
         sign: Sign,
     },
-    /// This count of numbers, of which the first three give a direction.
+    /// This count of numbers. The first three give a direction.
     Direction(usize),
     /// Four numbers that are not all 0.
     Quaternion,

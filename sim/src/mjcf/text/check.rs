@@ -22,7 +22,7 @@ pub(in crate::mjcf) struct Checked {
     pub bodies: Vec<BodyBytes>,
 }
 
-/// Positions in the text of a body and of the elements on it.
+/// Positions in the text of a body and of the elements inside.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct BodyBytes {
     pub body: usize,
@@ -101,8 +101,8 @@ impl Check<'_> {
         self.refused.push(self.source.refuse(node, what));
     }
 
-    /// Refuses settings after a class with angles: angles in a class are read with the settings before it,
-    /// and in MuJoCo all settings come first.
+    /// Refuses settings after a class with angles. Here the angles of a class are read with the settings
+    /// before it; in MuJoCo all settings come first.
     fn check_angles(&mut self, root: &Node) {
         let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
         let mut sections =

@@ -1,5 +1,5 @@
-//! From the text of a file with all includes to the model of `mjcf-rs`, and to the parts that `mjcf-rs` does
-//! not read.
+//! Conversion of a file's text, with all its includes, to the model of `mjcf-rs` and to the parts that
+//! `mjcf-rs` does not read.
 
 pub mod check;
 pub mod plain;

@@ -13,7 +13,7 @@ const ACTUATORS: [&str; 6] = ["general", "motor", "position", "velocity", "intve
 const SHARED: [&str; 5] = ["ctrlrange", "forcerange", "ctrllimited", "forcelimited", "gear"];
 /// Attributes that give a rotation; an element has at most one.
 const ROTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
-/// Attributes of which an element may state only the first numbers.
+/// Attributes with several numbers. An element may state only the first of them.
 const LISTS: [&str; 2] = ["size", "friction"];
 
 /// Range of the text and its replacement.

@@ -49,7 +49,7 @@ impl MjcfText {
         Ok(source)
     }
 
-    /// Returns the same files without any text of them.
+    /// Returns the same files with empty texts.
     pub(super) fn without_text(&self) -> MjcfText {
         let (files, folder) = (self.files.clone(), self.folder.clone());
         MjcfText { text: String::new(), files, pieces: Vec::new(), folder }
@@ -125,7 +125,7 @@ impl MjcfText {
         &self.pieces[after.saturating_sub(1)]
     }
 
-    /// Appends a file: the whole of it, or the content of its root element.
+    /// Appends a whole file, or the content of its root element.
     fn append(&mut self, file: usize, folder: &Path, inside_only: bool) -> Result<(), SimError> {
         let SourceFile { name, text, .. } = &self.files[file];
         let (name, text) = (name.clone(), text.clone());

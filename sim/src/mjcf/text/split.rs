@@ -17,7 +17,7 @@ const BALL_AXES: [(&str, [f64; 3]); 3] =
 /// Record of the splits in a file.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct Split {
-    /// True for each body that only carries one of several joints of the body on it.
+    /// True for each body that only carries one of several joints of the next body.
     pub is_part: Vec<bool>,
     /// Position of the first ball joint in the text.
     pub ball: Option<usize>,

@@ -27,7 +27,7 @@ impl<'a, 'i: 'a> Classes<'a, 'i> {
         places.flat_map(|class| class.ancestors().take_while(|one| one.has_tag_name("default"))).collect()
     }
 
-    /// Returns an attribute of an element: its own, or that of the nearest class that has it.
+    /// Returns an attribute of an element: the element's own, or that of the nearest class that states it.
     pub fn stated(&self, node: &Node<'a, 'i>, attribute: &str) -> Option<&'a str> {
         node.attribute(attribute).or_else(|| {
             let elements = self.of_element(node).into_iter().filter_map(|class| {

@@ -10,7 +10,7 @@ use crate::render::shading::CONTACT_TEXELS;
 use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Carrier, Part, PlacedScenery};
 
-/// Height above a surface from which on a thing does not darken it.
+/// Height above a surface at which a thing no longer darkens it.
 const REACH_M: f32 = 0.06;
 /// Maximum depth to which things sink into their support.
 pub const SINK_M: f32 = 0.03;

@@ -71,7 +71,7 @@ pub(super) struct Strip<'a> {
 /// loops, so that several points are processed at once.
 pub(super) struct Surfaces {
     count: usize,
-    /// Points in the world; the directions are in the world, too.
+    /// Points and directions, world frame.
     pub point_m: Vectors,
     /// Rays from the camera to the points; rays and normals have any length.
     pub ray: Vectors,

@@ -81,7 +81,7 @@ pub(super) fn is_real() -> bool {
     best().is_some_and(|adapter| rank(&adapter) >= REAL)
 }
 
-/// Rank from which on an adapter is hardware.
+/// Minimum rank of a hardware adapter.
 const REAL: u32 = 2;
 
 fn best() -> Option<Adapter> {

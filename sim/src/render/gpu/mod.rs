@@ -209,7 +209,7 @@ fn marking<'a>(
     })
 }
 
-/// Returns an attachment that keeps the nearest surface: depths are nearness, and start at none.
+/// Returns an attachment that keeps the nearest surface. Depths are inverse distances, and start at 0.
 fn nearest(depth: &TextureView) -> RenderPassDepthStencilAttachment<'_> {
     RenderPassDepthStencilAttachment {
         view: depth,

@@ -22,7 +22,7 @@ pub(super) struct Passes {
     pub scene: BindGroupLayout,
     /// Bindings of the first passes' results and of the image's destination.
     pub targets: BindGroupLayout,
-    /// Bindings of the nearness of solid surfaces, and of the layer of blended ones before.
+    /// Bindings of the nearness of solid surfaces, and of the previous layer of blended ones.
     pub peel: BindGroupLayout,
     pub shadow: RenderPipeline,
     /// Pass over samples, and over centres.
@@ -31,7 +31,7 @@ pub(super) struct Passes {
     pub first_veils: RenderPipeline,
     pub next_veils: RenderPipeline,
     pub resolve: ComputePipeline,
-    /// The same without depths and ids.
+    /// These passes without depths and ids.
     pub resolve_colours: ComputePipeline,
 }
 

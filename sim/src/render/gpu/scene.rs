@@ -49,7 +49,7 @@ pub(super) struct SceneBuffers {
     pub corners: u32,
 }
 
-/// Uniforms of a camera, and the scene bound with them.
+/// Uniforms of a camera, and the scene's bind group for this camera.
 struct SceneView {
     numbers: Buffer,
     group: BindGroup,

@@ -112,7 +112,7 @@ pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), Gpu
     Ok(())
 }
 
-/// Maps of shadows: all layers, and each by itself.
+/// Maps of shadows: all layers together, and each layer alone.
 pub(super) struct ShadowMaps {
     pub all: TextureView,
     pub layers: Vec<TextureView>,

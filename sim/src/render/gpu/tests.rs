@@ -61,7 +61,7 @@ fn both_renderers_draw_the_same() {
     let Some(mut gpu) = gpu(Scenery::of(&world)) else { return };
     let mut embedded = cpu(Scenery::of(&world));
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
-    // Twice, to verify that moved parts are drawn at their new poses.
+    // The images are drawn twice, to verify that moved parts are at their new poses.
     for _ in 0..2 {
         let step =
             (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
@@ -241,7 +241,8 @@ fn pictures_of_many_worlds_are_one_submission_and_one_read_back() {
     else {
         return;
     };
-    // Each in another state; twice, to verify that moved parts are drawn at their new poses.
+    // Each world is in another state. Its images are drawn twice, to verify that moved parts are at their new
+    // poses.
     for _ in 0..2 {
         let advance = |(number, world): (usize, &mut World)| {
             let commands = [world.rest_command(0), world.rest_command(1)];

@@ -39,8 +39,8 @@ pub fn colours(requests: &mut [RenderRequest]) -> Option<Vec<Vec<Vec<u8>>>> {
     Some(frames.into_iter().map(|frames| frames.into_iter().map(|frame| frame.rgb).collect()).collect())
 }
 
-/// Renders the image of each camera, renderer by renderer. After an error no renderer assumes that
-/// anything was drawn.
+/// Renders the image of each camera, renderer by renderer. After an error, every renderer counts as not
+/// having drawn.
 pub(super) fn draw(asked: &mut [Asked]) -> Result<Vec<Vec<Frame>>, GpuError> {
     let Some(first) = asked.first() else { return Ok(Vec::new()) };
     let gpu = first.renderer.gpu.clone();

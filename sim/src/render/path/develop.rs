@@ -1,4 +1,4 @@
-//! From light to the colours of an image: surfaces' own colours, smooth edges, exposure and tones.
+//! Conversion of light to the colours of an image: surfaces' own colours, smooth edges, exposure and tones.
 
 use rapier3d::math::Vector;
 
@@ -9,7 +9,7 @@ use crate::render::shading::lamps::linear_light;
 /// Linear value from which bright tones are compressed, and the value that becomes white.
 const KNEE_VALUE: f32 = 0.5;
 const WHITE_VALUE: f32 = 3.0;
-/// Least likeness of surfaces that share their light.
+/// Minimum likeness of surfaces that share their light.
 const ALIKE: f32 = 0.7;
 
 /// The light of an image, filtered.
@@ -42,7 +42,7 @@ impl Negative<'_> {
     /// Returns the linear colour of a surface in a pixel, in the light of the pixel about it that shows it
     /// best.
     fn seen_rgb(&self, row: usize, column: usize, seen: &SeenSurface) -> Vector {
-        // Any light is better than none.
+        // Even little light gives a better image than no light.
         let rank = |there: usize| match &self.guides[there] {
             SeenSurface { id: 0, .. } => -1.0,
             guide => seen.likeness(guide),

@@ -80,7 +80,7 @@ impl FilterPass<'_> {
         })
     }
 
-    /// Returns a row or column of pixels and those on both sides of it, as far as the image has them.
+    /// Returns a row or column of pixels and its neighbours on both sides, where the image has them.
     fn neighbours(&self, at: usize, limit: usize) -> [Option<usize>; 3] {
         let step = 1 << self.number;
         [at.checked_sub(step), Some(at), Some(at + step).filter(|at| *at < limit)]

@@ -15,13 +15,13 @@ const LAMP_HALF_M: [f32; 2] = [0.9, 0.6];
 const LAMP_HEIGHT_M: f32 = 2.75;
 /// Height at which lamps shine from the direction of [`Light::sun_direction`].
 const TABLE_HEIGHT_M: f32 = 0.8;
-/// Distance of lamps from a ceiling, and the height from which it is searched.
+/// Distance of lamps from a ceiling, and minimum height of a ceiling.
 const CEILING_GAP_M: f32 = 0.02;
 const CEILING_FROM_M: f32 = 1.9;
 /// Distance between lamps, for rooms that need several.
 const LAMP_PITCH_M: f32 = 4.0;
 const MAX_LAMPS_A_SIDE: usize = 4;
-/// Height from which a part of the room counts as wall, and the greatest extent of a room.
+/// Height above which a part of the room counts as wall, and the maximum extent of a room.
 const WALL_HEIGHT_M: f32 = 1.0;
 const MAX_ROOM_M: f32 = 40.0;
 
@@ -48,7 +48,7 @@ enum Sources {
     Stated(Vec<FileLight>, Headlight),
 }
 
-/// Light from a point of a source, if nothing is between.
+/// Light from a point of a source, if no surface is in between.
 pub struct Beam {
     pub direction: Vector,
     pub reach_m: f32,
@@ -117,8 +117,8 @@ impl Lights {
         }
     }
 
-    /// Draws a lamp by the inverse fourth power of its distance, which the light of all of them roughly
-    /// follows, and then a point of it.
+    /// Draws a lamp, and then a point on that lamp. The probability of a lamp is proportional to the inverse
+    /// fourth power of its distance, and so, roughly, is its light.
     fn lamp_beam(&self, lamps_m: &[Vector], point_m: Vector, [u, v]: [f32; 2]) -> Beam {
         let weight = |lamp_m: &Vector| 1.0 / lamp_m.distance_squared(point_m).powi(2).max(1e-3);
         let sum = lamps_m.iter().map(weight).sum::<f32>();
@@ -162,7 +162,7 @@ fn stated_beam(lights: &[FileLight], point_m: Vector, draw_value: f32) -> Beam {
     Beam { direction: Vector::Z, reach_m: 0.0, rgb: Vector::ZERO }
 }
 
-/// Returns the box around the walls of a room and everything of that height; `None` in the open.
+/// Returns the box around the walls of a room and all other parts of that height; `None` in the open.
 pub fn walls_m(scenery: &Scenery) -> Option<[Vector; 2]> {
     let mut box_m = None;
     for part in scenery.parts.iter().filter(|part| part.carrier == Carrier::Room) {

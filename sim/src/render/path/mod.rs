@@ -60,7 +60,7 @@ pub(super) struct PathRenderer {
 /// Parts that move together.
 struct Mover {
     body: Body,
-    /// The first of its parts, from whose pose that of the body follows.
+    /// The first of its parts. The pose of the body follows from this part's pose.
     first_part: usize,
     mesh_from_carrier: Pose,
 }

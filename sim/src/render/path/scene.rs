@@ -15,9 +15,10 @@ use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::Affine;
 use crate::render::{Pattern, PlacedScenery};
 
-/// Most surfaces that light is reflected by after the one that is seen.
+/// Maximum number of surfaces that reflect light on a path, after the visible one.
 const MAX_BOUNCES: u32 = 4;
-/// Number of bounces after which a path may end early, by chance, and the greatest probability to go on.
+/// Number of bounces after which a path may end early, by chance, and the maximum probability that it goes
+/// on.
 const SURE_BOUNCES: u32 = 1;
 const MAX_SURVIVAL: f32 = 0.9;
 /// Limit of the light that a path brings: more would be a bright speck.
@@ -26,12 +27,12 @@ const MAX_PATH_VALUE: f32 = 6.0;
 /// of the distribution of its facets.
 const COAT: f32 = 0.04;
 const COAT_WIDTH_2: f32 = 0.015;
-/// Least roughness: what is smoother would show single paths.
+/// Minimum roughness: smoother surfaces would show single paths.
 const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
-/// Least cosine between the normal of a mirror and its mesh's z.
+/// Minimum cosine between the normal of a mirror and its mesh's z.
 const MIN_MIRROR_COSINE: f32 = 0.999;
-/// Width of the spots that reflect light on others, for images on them.
+/// Width of the spots over which the images of reflecting surfaces are averaged.
 const REFLECTED_WIDTH_M: f32 = 0.02;
 
 /// A state of a scenery, ready to be traced.
@@ -58,8 +59,7 @@ pub struct Coat {
 
 /// Layers of the light at a seen point. They are filtered separately.
 pub const LAYERS: usize = 3;
-/// Light of the lamps, that of everything else, both without the surface's colour, and the reflection in
-/// its coat.
+/// Light of the lamps, other light (both without the surface's colour), and the reflection in its coat.
 pub const DIRECT: usize = 0;
 pub const INDIRECT: usize = 1;
 pub const COATED: usize = 2;
@@ -71,7 +71,7 @@ pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
 }
 
 impl Coat {
-    /// Returns the clear coat of a surface that states nothing; otherwise a rougher one, or metal.
+    /// Returns the clear coat of a surface without its own gloss; otherwise a rougher coat, or metal.
     pub fn of(gloss: &Gloss) -> Coat {
         let width_2_ratio = gloss.roughness_factor.map_or(COAT_WIDTH_2, |roughness| {
             let squared = roughness.clamp(MIN_COAT_ROUGHNESS, 1.0) * roughness.clamp(MIN_COAT_ROUGHNESS, 1.0);
@@ -223,8 +223,8 @@ impl Scene<'_> {
         }
     }
 
-    /// Returns the light that arrives at a point from a direction, of one path. Coats of what it meets
-    /// are left out, except for the light that they keep out.
+    /// Returns the light of one path that arrives at a point from a direction. Reflections in the coats of
+    /// surfaces on the way are left out, but not the light that coats keep out.
     pub fn arriving_rgb(
         &self,
         mut start_m: Vector,

@@ -23,9 +23,9 @@ impl PixelSeed {
         }
     }
 
-    /// Returns a point of the unit square for one of `count` samples. Those of a tile, of a pixel and of a
-    /// square of four pixels are each stratified: they are points of Sobol's (0, 2)-sequence. The same
-    /// numbers, apart from a shift, belong to each `purpose`, so a path may use only one of them.
+    /// Returns a point of the unit square for one of `count` samples. The samples of a tile, of a pixel and
+    /// of a square of four pixels are each stratified: they are points of Sobol's (0, 2)-sequence. Each
+    /// `purpose` has the same numbers, apart from a shift, so a path may use a purpose only once.
     pub fn spread(self, purpose: u32, sample: u32, SampleCount(count): SampleCount) -> [f32; 2] {
         let index = self.number * count + sample;
         let shift = hashed(self.tile ^ hashed(purpose));

@@ -50,7 +50,7 @@ fn depth_and_ids_are_those_of_the_embedded_renderer() {
     let (mut path, mut embedded) =
         (PathRenderer::new(Prepared::new(Scenery::of(&world))), cpu(Scenery::of(&world)));
     let commands = [world.rest_command(0), world.rest_command(1)];
-    // Twice, to verify that moved parts are at their new poses.
+    // The images are drawn twice, to verify that moved parts are at their new poses.
     for _ in 0..2 {
         let step =
             (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
@@ -99,7 +99,7 @@ fn red_wall() -> (Scenery, Camera) {
 fn a_red_wall_colours_the_floor_beside_it() {
     let step = world("floor", Vec::new()).present();
     let (scenery, camera) = red_wall();
-    // Red over blue on the floor 11 cm from the wall, and on the floor far from it.
+    // Ratio of red to blue on the floor 11 cm from the wall, and on the floor far away.
     let beside_and_away = |frame: Frame| {
         let redness = |column: usize| {
             let floor = (10..22).map(|row| &frame.rgb[(row * 48 + column) * 3..][..3]);

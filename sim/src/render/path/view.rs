@@ -17,8 +17,8 @@ use crate::render::{Camera, Intrinsics, Scenery};
 
 /// Points of a lamp to which each path of a pixel looks.
 const LAMP_POINTS: u32 = 2;
-/// Distance from the plane of a surface, as a share of the distance on it, at which a point is on another
-/// one; and the least such distance.
+/// Minimum distance of a point from the plane of a surface at which it belongs to another surface. It is a
+/// share of the distance along the surface, and at least `MIN_ASIDE_M`.
 const ASIDE_SHARE: f32 = 0.15;
 const MIN_ASIDE_M: f32 = 0.002;
 /// Share of the surfaces towards the rasterisers' sun that it reaches.
@@ -42,7 +42,7 @@ pub struct SeenSurface {
     pub albedo: Vector,
     /// Colour of its image alone; 1 without.
     pub texture_rgb: Vector,
-    /// Light of its own: the layer for it, beside the emission of its gloss.
+    /// Light that the surface emits by a layer, besides the emission of its gloss.
     pub emitted_rgb: Vector,
     pub gloss: Gloss,
     /// Share of the mirror image in its colour.
@@ -122,7 +122,7 @@ impl<'a> PathView<'a> {
         rgb
     }
 
-    /// Returns the linear colour of a surface in an image of a rasteriser, with as much shadow as usual.
+    /// Returns the linear colour of a surface in an image of a rasteriser, with the usual shadow.
     pub fn rasterised_rgb(&self, seen: &SeenSurface) -> Vector {
         let SeenSurface { point_m, normal, albedo, texture_rgb, emitted_rgb, gloss, .. } = *seen;
         let Scenery { light, lamps, .. } = &self.scene.prepared.scenery;
@@ -210,7 +210,7 @@ impl<'a> PathView<'a> {
         self.world_from_camera.translation
     }
 
-    /// Returns the direction from what the camera looks at to the camera.
+    /// Returns the direction from the visible point to the camera.
     pub fn back(&self) -> Vector {
         self.world_from_camera.rotation * Vector::Z
     }
@@ -260,7 +260,7 @@ impl<'a> PathView<'a> {
 }
 
 impl SeenSurface {
-    /// Returns the colour of what the surface reflects of white light: metal has its own.
+    /// Returns the colour in which a surface reflects white light. That of a metal is not white.
     pub fn coat_rgb(&self) -> Vector {
         Vector::ONE + (self.albedo - Vector::ONE) * self.gloss.metallic_factor
     }

@@ -84,7 +84,7 @@ impl From<&MjcfCamera> for Intrinsics {
     }
 }
 
-/// Distance below which nothing is drawn.
+/// Distance below which surfaces are not drawn.
 pub const NEAR_M: f32 = 0.01;
 
 /// Cameras of one world, as described in its files.

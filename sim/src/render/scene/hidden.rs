@@ -5,7 +5,8 @@ use rapier3d::math::{Pose, Vector};
 
 use crate::render::TriangleMesh;
 
-/// Minimum depth of a hidden triangle; less deep ones stay, since rounding may bring them out.
+/// Minimum depth of a hidden triangle. Triangles at smaller depths stay, since rounding may make them
+/// visible.
 const DEPTH_M: f32 = 1e-4;
 /// Maximum distance of a convex mesh's corners in front of its faces.
 const ROUNDING_M: f32 = 1e-5;
@@ -47,7 +48,7 @@ impl Placed {
             mesh.vertices.iter().map(|corner| *body_from_mesh * corner.position_m).collect();
         let hull_m = (mesh.triangles.len() <= MAX_HULL_TRIANGLES)
             .then(|| hull_m(mesh, &corners_m))
-            // What is flat has no inside.
+            // A flat mesh has no inside.
             .filter(|faces_m| is_deeper(faces_m, centre_m, DEPTH_M))
             .filter(|faces_m| corners_m.iter().all(|corner_m| is_deeper(faces_m, *corner_m, -ROUNDING_M)));
         Placed { corners_m, centre_m, radius_m, hull_m }

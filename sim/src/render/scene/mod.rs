@@ -31,7 +31,7 @@ pub struct Scenery {
     pub light: Light,
     /// Lights of the scene's file, in place of sun and sky.
     pub lamps: Option<Lamps>,
-    /// The room without anything in it, and in its own colours, for its light; `None` with `lamps`.
+    /// The empty room, from which its baked light is computed; `None` with `lamps`.
     pub room: Option<Arc<Scenery>>,
     /// Image around the camera where no surface is, or the six of a cube.
     pub sky: Option<Arc<Texture>>,
@@ -101,7 +101,7 @@ const ROOM_ID: u32 = 1;
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
-/// The same for lights of files: their scenes are seen as a whole.
+/// Focus for lights of files, whose scenes are seen as a whole.
 const LAMPS_FOCUS_RADIUS_M: f32 = 2.5;
 /// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
 /// into the room.
@@ -127,7 +127,7 @@ impl Lamps {
 }
 
 impl Part {
-    /// Returns true if what is behind shows through.
+    /// Returns true if surfaces behind it show through.
     pub fn is_veil(&self) -> bool {
         self.alpha < SOLID_ALPHA || self.is_cut_out()
     }
@@ -139,7 +139,7 @@ impl Part {
 }
 
 impl Scenery {
-    /// Collects everything in `world` that is drawn.
+    /// Collects all visible parts of `world`.
     pub fn of(world: &World) -> Scenery {
         let mut parts = Vec::new();
         add_parts(&mut parts, world.room(), Carrier::Room, ROOM_ID, |geom| geom.rgba);
@@ -163,7 +163,7 @@ impl Scenery {
         }
         let lamps = world.lights().map(lamps);
         let focus_radius_m = if lamps.is_some() { LAMPS_FOCUS_RADIUS_M } else { FOCUS_RADIUS_M };
-        // As in MuJoCo, nothing is behind a scene with lights that has no sky.
+        // As in MuJoCo, a scene with lights and without a sky has no background.
         let dark = || lamps.is_some().then(|| Arc::new(Texture::plain([0; 3])));
         let sky = world.sky().cloned().or_else(dark);
         Scenery { parts, focus_radius_m, light: Light::default(), lamps, room, sky }

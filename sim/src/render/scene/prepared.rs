@@ -29,7 +29,7 @@ pub struct Prepared {
     pub images: Vec<Option<Image>>,
     /// True if layers of images change ambient light or emit light.
     pub has_layers: bool,
-    /// Parts that show what is behind them.
+    /// Parts that show the surfaces behind them.
     pub is_veil: Vec<bool>,
     /// Image of the sky.
     pub sky: Option<Image>,
@@ -113,7 +113,7 @@ impl Prepared {
     /// Returns the id of a sheet in images.
     #[inline(always)]
     pub fn id(&self, sheet: u32) -> u32 {
-        // No sheet has the number of nothing.
+        // No sheet has the number that marks a sample without a surface.
         self.ids.get(sheet as usize).copied().unwrap_or(0)
     }
 }

@@ -67,7 +67,7 @@ fn uses_uvs(geom: &Geom) -> bool {
     geom.image.as_ref().is_some_and(|image| image.mapping == TextureMapping::Corners)
 }
 
-/// Returns true if a geom does not hide what is inside of it.
+/// Returns true if the geoms inside of a geom are visible.
 fn is_clear(geom: &Geom) -> bool {
     let has_alpha = geom.image.as_ref().is_some_and(|image| image.texture.has_alpha);
     geom.rgba[3] < SOLID_ALPHA || has_alpha

@@ -58,8 +58,8 @@ pub struct Exposure {
 }
 
 impl Exposure {
-    /// Returns the setting that multiplies the light by `wanted_factor`, as far as its limits allow: a long
-    /// exposure rather than gain.
+    /// Returns the setting that multiplies the light by `wanted_factor`, within its limits. A long exposure
+    /// is preferred to gain.
     fn of(wanted_factor: f32) -> Exposure {
         let light_1_s = WHITE_1_S / FULL_WELL;
         let time_s = (wanted_factor / light_1_s).clamp(EXPOSURE_S[0], EXPOSURE_S[1]);

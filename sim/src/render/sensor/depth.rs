@@ -14,11 +14,12 @@ const FOCAL_PX: f32 = 645.0;
 pub const DISPARITY_PX_M: f32 = FOCAL_PX * BASELINE_M;
 /// Steps of the disparity in a pixel.
 pub const STEPS: f32 = 32.0;
-/// Standard deviation of the disparity: assumed, so that depth is within the 2 % at 2 m of the datasheet.
+/// Standard deviation of the disparity. It is assumed such that the error of depth is within the datasheet's
+/// 2 % at 2 m.
 pub const NOISE_PX: f32 = 0.08;
 /// Depth within which there is any: the datasheet's minimum at full resolution, and its maximum.
 pub const RANGE_M: [f32; 2] = [0.28, 10.0];
-/// Depth is told in millimetres.
+/// Depth is reported in millimetres.
 const UNITS_1_M: f32 = 1000.0;
 
 /// Returns the depth that the camera measures; infinite where it measures none.
@@ -35,8 +36,8 @@ pub fn taken(ideal_m: &[f32], map: &LensMap, seed: u64) -> Vec<f32> {
     depth_m
 }
 
-/// Removes the depth of points that the right imager does not see. In its image, a point is further left by
-/// its disparity, so nearer things cover what is to the left of them.
+/// Removes the depth of points that the right imager does not see. In its image, a point is shifted to the
+/// left by its disparity, so nearer surfaces cover the points to their left.
 fn hide(depth_m: &mut [f32], focal_px: f32) {
     let mut covered_from = f32::INFINITY;
     for (column, depth_m) in depth_m.iter_mut().enumerate().rev() {

@@ -2,7 +2,7 @@
 //! one that a camera would deliver. This is the same for all renderers, and a function of the ideal image,
 //! a seed and the camera's motion, so that the same step always has the same image.
 //!
-//! The book's page about physics lists what is modelled, with values and sources.
+//! The book's page about physics lists the modelled effects, with values and sources.
 
 mod colour;
 mod depth;
@@ -57,8 +57,8 @@ impl CameraView {
         self.take(renderer.render(step, &self.camera))
     }
 
-    /// Renders only the colours of the image after `step`, as [`CameraView::render`] does. A sensor needs
-    /// the depth, too: what is near moves more in a moving camera's image.
+    /// Renders only the colours of the image after `step`, like [`CameraView::render`]. A sensor needs the
+    /// depth, too: near surfaces move more in a moving camera's image.
     pub fn render_colours(&self, renderer: &mut dyn Renderer, step: &Step) -> Vec<u8> {
         match self.shot {
             None => renderer.render_colours(step, &self.camera),
@@ -120,7 +120,7 @@ impl Shot {
         noise::mixed(u64::from(episode) << 32 | robot as u64) ^ noise::mixed(control_step + 1)
     }
 
-    /// Returns the image that a D435i takes of what an ideal camera of these intrinsics sees.
+    /// Returns a D435i's image of the view of an ideal camera with these intrinsics.
     fn d435i(&self, ideal: Frame, lens: &Intrinsics) -> Frame {
         let light = colour::SensorLight::of(&ideal.rgb, ideal.width, ideal.height);
         let map = LensMap::of(lens);

@@ -20,7 +20,7 @@ impl CameraMotion {
         let before_from_after = world_from_before.inverse() * *world_from_after;
         let turn = before_from_after.rotation;
         CameraMotion {
-            // In the frame after the step, like the image.
+            // The motion is in the frame after the step, like the image.
             linear_m_s: turn.inverse() * before_from_after.translation / CONTROL_DT_S,
             angular_rad_s: turn.to_scaled_axis() / CONTROL_DT_S,
         }
@@ -34,7 +34,7 @@ impl CameraMotion {
     ///   dy/dt = (vy - y vz) / z - wx (1 + y^2) + wz x + wy x y.
     #[inline(always)]
     pub(super) fn flow(&self, [x, y]: [f32; 2], inverse_depth_1_m: f32) -> [f32; 2] {
-        // From the axes of MJCF (y up, z back) to those of the image (y down, z forward).
+        // This converts from the axes of MJCF (y up, z back) to those of the image (y down, z forward).
         let [vx, vy, vz] = [self.linear_m_s.x, -self.linear_m_s.y, -self.linear_m_s.z];
         let [wx, wy, wz] = [self.angular_rad_s.x, -self.angular_rad_s.y, -self.angular_rad_s.z];
         let xy = x * y;

@@ -1,4 +1,4 @@
-//! Laws of a D435i's images, on images whose ideal is known.
+//! Tests of a D435i's images, on images with known ideal ones.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -104,14 +104,14 @@ fn a_near_thing_has_a_hole_of_the_baseline_on_its_left() {
         assert_eq!(holes.len(), 150 - holes[0], "one hole in row {row}: {holes:?}");
         assert!((holes.len() as f32 - width_px).abs() <= 1.0, "{} columns, not {width_px}", holes.len());
     }
-    // A floor that leads away has none.
+    // A floor that extends away from the camera has none.
     let floor_m = each_pixel(|u, v| if v < 130 { 9.0 } else { 90.0 / (v as f32 - 120.0 + 0.05 * u as f32) });
     assert!(depth::taken(&floor_m, &LensMap::of(&lens()), 7).iter().all(|depth_m| depth_m.is_finite()));
 }
 
 #[test]
 fn colours_have_the_noise_of_their_electrons() {
-    // So dark that the gain is at its limit.
+    // The scene is dark, so that the gain is at its limit.
     let grey = vec![20; 3 * WIDTH * HEIGHT];
     let light = SensorLight::of(&grey, WIDTH as u32, HEIGHT as u32);
     let exposure = light.exposure();
@@ -129,7 +129,7 @@ fn colours_have_the_noise_of_their_electrons() {
         assert!((mean - f64::from(to_byte(value))).abs() < 0.5, "{mean} of colour {axis}");
         assert!(deviation > 2.0, "one would see it: {deviation}");
     }
-    // Twice the electrons have half the variance, relative to the square of their number.
+    // With twice the electrons, the variance relative to the square of their number is half.
     let variance = |gain| Exposure { time_s: 0.02, gain }.variance(HEIGHT as u32)[1][0];
     assert!((variance(4.0) / variance(2.0) - 2.0).abs() < 1e-5);
 }
@@ -176,7 +176,7 @@ fn a_turning_camera_shears_and_blurs_its_image() {
     let turn_rad_s = 1.5;
     let motion = CameraMotion { linear_m_s: Vector::ZERO, angular_rad_s: Vector::Y * turn_rad_s };
     let rows = edge(f32::INFINITY, motion);
-    // To the left: things move to the right, the more the later a row is read.
+    // The camera moves to the left, so things move to the right, by more the later a row is read.
     let shear_px = FOCAL_PX * turn_rad_s * READOUT_S;
     let part = |rows: &[[f32; 2]], i: usize| rows.iter().map(|row| row[i]).sum::<f32>() / rows.len() as f32;
     let (top, bottom) = (part(&rows[..20], 0), part(&rows[220..], 0));
@@ -185,7 +185,7 @@ fn a_turning_camera_shears_and_blurs_its_image() {
     assert!((part(&rows[110..130], 0) - 160.0).abs() < 0.2, "the middle row is of this moment");
     let still = edge(f32::INFINITY, CameraMotion::STILL);
     assert!(part(&still, 1) < 0.5 && (part(&still, 0) - 160.0).abs() < 0.2);
-    // Exposed for 33 ms: from 15 to 85 % are seven tenths of the way.
+    // With an exposure of 33 ms, the way from 15 to 85 % is seven tenths of the motion.
     let blur_px = 0.7 * FOCAL_PX * turn_rad_s * 0.033;
     assert!((part(&rows, 1) - blur_px).abs() < 1.0, "{} pixels, not {blur_px}", part(&rows, 1));
 }

@@ -1,11 +1,11 @@
-//! Light that falls on the pixels of a sensor whose camera moves.
+//! Light on the pixels of a moving camera's sensor.
 
 use super::lens::LensMap;
 use super::motion::CameraMotion;
 use crate::render::Intrinsics;
 
-/// Stretch of the ideal image, in pixels, that a sample of a blurred pixel stands for: as far as blending
-/// between pixels reaches.
+/// Maximum stretch of the ideal image, in pixels, for one sample of a blurred pixel. Blending between pixels
+/// has this reach.
 const SAMPLE_PX: f32 = 1.0;
 /// Maximum number of samples of a blurred pixel.
 const MAX_SAMPLES: i32 = 16;

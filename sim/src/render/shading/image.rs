@@ -34,7 +34,7 @@ pub struct ImagePlace {
     pub uv: [f32; 2],
     pub x_step_uv: [f32; 2],
     pub y_step_uv: [f32; 2],
-    /// Number of the image; 0 if there is one.
+    /// Index of the image; 0 if there is only one.
     pub face: usize,
 }
 
@@ -45,7 +45,7 @@ const LIGHT_VALUES: usize = 256 * LIGHT_STEPS;
 static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
     LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
 
-/// Least number along the surface's own normal in a relief.
+/// Minimum part of a relief's normal along the surface's own normal.
 pub const MIN_UPRIGHT_SHARE: f32 = 0.05;
 /// Part of the way from one level to the next in which both are blended.
 pub const BLENDED_SHARE: f32 = 0.5;
@@ -132,7 +132,8 @@ impl Image {
         (light_of(&texel), if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
     }
 
-    /// Returns the linear colour of the light that the surface emits at a place; `None` without a layer for it.
+    /// Returns the linear colour of the light that the surface emits at a place; `None` if it has no layer of
+    /// emission.
     #[inline(always)]
     pub fn emitted_rgb(&self, place: &ImagePlace, gloss: &Gloss) -> Option<[f32; 3]> {
         let texture = self.emitted.as_ref()?;

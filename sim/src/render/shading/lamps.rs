@@ -85,7 +85,7 @@ pub fn shown_rgb(
             own_lit += light.diffuse_rgb * (share * facing);
             own_glossy = light.specular_rgb * (share * shine(towards));
         }
-        // MuJoCo limits the light of each lamp with shadows by itself.
+        // MuJoCo limits the light of each lamp with shadows separately.
         if light.casts_shadow {
             shown += limited(own_lit, own_glossy);
         } else {
@@ -108,7 +108,7 @@ pub fn tilted(sun_direction: Vector) -> Vector {
     if is_upright { Vector::new(LEAST, 0.0, sun_direction.z).normalize() } else { sun_direction }
 }
 
-/// Returns the pose of a camera that sees what a spot or a point light shines on, and its field of view.
+/// Returns the pose and the field of view of a camera that sees the surfaces lit by a spot or a point light.
 pub fn lamp_view(light: &FileLight) -> (Pose, f32) {
     let up = if light.direction.z.abs() > 0.99 { Vector::X } else { Vector::Z };
     let target_m = light.position_m + light.direction;

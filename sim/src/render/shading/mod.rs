@@ -43,7 +43,7 @@ impl Default for Light {
     fn default() -> Light {
         Light {
             sun_rgb: Vector::new(0.80, 0.77, 0.72),
-            // High, so that hands over a counter cast their shadow on it.
+            // The sun is high, so that hands over a counter cast their shadows onto the counter.
             sun_direction: Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5),
             below_rgb: Vector::new(0.20, 0.19, 0.18),
             above_rgb: Vector::new(0.40, 0.42, 0.45),
@@ -73,7 +73,7 @@ pub const SUN_DISTANCE_M: f32 = 8.0;
 pub const NORMAL_OFFSET_M: f32 = 0.006;
 pub const BIAS_M: f32 = 0.004;
 
-/// Distance from the map's border over which shadows fade out, so that none ends in a line.
+/// Distance from the map's border over which shadows fade out, so that no shadow ends in a line.
 pub const FADE_TEXELS: f32 = 120.0;
 
 /// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.

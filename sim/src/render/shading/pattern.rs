@@ -31,8 +31,8 @@ pub const BANDS_PER_M: f32 = 13.0;
 pub const LINES_PER_M: f32 = 41.0;
 pub const STRAY: f32 = 0.4;
 pub const THREADS_PER_M: f32 = 18.0;
-/// Lines of print and words in them; the gaps are shares of half a period, and words of the next line
-/// are shifted.
+/// Lines of print per metre, and words per metre of a line. The gaps are shares of half a period, and the
+/// words of the next line are shifted.
 pub const TEXT_PER_M: f32 = 48.0;
 pub const TEXT_GAP: f32 = 0.55;
 pub const WORDS_PER_M: f32 = 27.0;

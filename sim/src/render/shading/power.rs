@@ -1,7 +1,7 @@
 //! Powers of many numbers, in steps that compilers turn into few instructions for several at once, and the
 //! values of files for linear light.
 
-/// Least number whose power is computed; smaller ones count as this.
+/// Minimum number whose power is computed. Smaller numbers are replaced by it.
 const LEAST: f32 = 1e-12;
 
 /// Returns a power of a number of at least 0, within a thousandth. An exponent of at most 200 gives a
@@ -12,7 +12,7 @@ pub fn power(value: f32, exponent_value: f32) -> f32 {
     exp2(exponent_value * log2(value))
 }
 
-/// Converts linear light to the value that files have for it, of sRGB.
+/// Converts linear light to the value of sRGB, in which files store colours.
 #[inline(always)]
 pub fn file_value(linear_value: f32) -> f32 {
     let curve = 1.055 * power(linear_value, 1.0 / 2.4) - 0.055;

@@ -56,7 +56,7 @@ pub(in crate::world) fn insert_scene(
         };
         placed.push(PlacedTree { tree, id, colliders });
     }
-    // Welds hold bodies in their placed poses, whatever their initial state.
+    // Welds hold bodies in their placed poses, for any initial state.
     add_equalities(dynamics, scene, &placed, &world_from_file)?;
     if may_sleep {
         placed.iter().filter_map(|tree| tree.id).for_each(|id| dynamics.let_sleep(id));
@@ -144,8 +144,8 @@ fn insert_moving(
     Ok((id, colliders))
 }
 
-/// Returns the link that carries another by several joints, if it can move. The two do not touch, as with a
-/// single joint.
+/// Returns the link that carries another by several joints, if it can move. These two links never touch, as
+/// with a single joint.
 fn carrier(tree: &BodyTree, link: usize) -> Option<usize> {
     let above = |link: usize| tree.links[link].parent;
     let first_part = above(link).filter(|parent| tree.links[*parent].is_part)?;

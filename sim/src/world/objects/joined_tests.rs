@@ -23,7 +23,8 @@ fn farthest_m(inside: &str) -> f32 {
     farthest_m
 }
 
-/// A drawer that overlaps its fixed carcass: the base of its own tree, another tree, or the world itself.
+/// A drawer overlaps its fixed carcass, which is the base of the same tree, another tree, or the world
+/// itself.
 #[test]
 fn what_moves_may_be_kept_apart_from_what_does_not() {
     let rail = r#"<joint type="slide" axis="0 -1 0" range="0 0.3" damping="5"/>"#;

@@ -37,7 +37,7 @@ pub struct ObjectState {
     pub angular_velocity_rad_s: Vector,
 }
 
-/// A named thing that is not a robot: a link that moves, or a mark that is only looked at.
+/// A named object that is not a robot: a link that moves, or a mark, which only marks a place.
 pub(super) struct Object {
     /// Name of the object in tasks.
     pub name: String,

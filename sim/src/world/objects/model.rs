@@ -35,7 +35,7 @@ pub struct ObjectModel {
     pub name: String,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
-    /// Mass of this body alone, without the parts that move on it.
+    /// Mass of this body alone, without its moving parts.
     pub mass_kg: f32,
     /// Freedom of the body against the one that carries it; `None` unless it is a hinge or a slide.
     pub opening: Option<Opening>,
@@ -49,8 +49,8 @@ pub struct ObjectPart {
     pub name: String,
     /// Pose in the object's frame, which is that of its first part.
     pub object_from_part: Pose,
-    /// The same with its own joint at the end of its range that is farther from 0; `None` for a part whose
-    /// joint has no range.
+    /// Pose in the object's frame with its own joint at the end of its range that is farther from 0; `None`
+    /// for a part whose joint has no range.
     pub object_from_moved_part: Option<Pose>,
     /// Name in a world of the part that carries this one; `None` if the world does.
     pub carrier: Option<String>,
@@ -61,7 +61,7 @@ impl ObjectPart {
     fn of_scene(scene: &Document, body: &str, name: &str) -> Result<ObjectPart, SimError> {
         let SceneBody { link, carrier, .. } = scene.scene_body(body)?;
         let mut model = ObjectModel::of(&link);
-        // A motion against a body without a name of its own could not be told.
+        // A motion relative to a body without a name could not be described.
         if carrier.as_ref().is_some_and(|carrier| scene.scene_body(carrier).is_err()) {
             model.opening = None;
         }
@@ -96,7 +96,7 @@ impl ObjectModel {
                 object_from_part,
                 object_from_moved_part: farthest(&link.joint).map(|moved| object_from_part * moved),
                 carrier: link.parent.map(|carrier| parts[carrier].name.clone()),
-                // Where the file is placed is not known here.
+                // The place of the file is not known here.
                 model: match link.parent {
                     Some(_) => ObjectModel::of(link),
                     None => ObjectModel { opening: None, ..ObjectModel::of(link) },
@@ -126,7 +126,8 @@ impl ObjectModel {
         self.solid.encloses(point_m)
     }
 
-    /// Reads an object's file. Returns the document, and its one top-level body with everything on it.
+    /// Reads an object's file. Returns the document and its one top-level body, including the bodies that it
+    /// carries.
     pub(super) fn read(file: &ObjectFile) -> Result<(Document, BodyTree), SimError> {
         let document = match file {
             ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,

@@ -155,7 +155,7 @@ fn carried_objects_are_held_by_what_they_have() {
         for added in ["rail", "handle", "bar", "apron"] {
             assert!(!names.iter().any(|name| name.contains(added)), "{name} has a {added}: {names:?}");
         }
-        // Nothing sticks out, whatever its name, and whether it collides or not.
+        // No shape extends beyond this, whatever its name is, and whether it collides or not.
         let model = object(name);
         let shapes = model.geoms.iter().filter_map(|geom| geom.collider());
         let bounds =

@@ -123,7 +123,7 @@ fn blended_surfaces_are_over_those_behind_them() {
     let pane = |rgb: &str, z: &str| {
         format!(r#"<geom type="box" size="0.3 0.3 0.01" pos="0 0 {z}" rgba="{rgb} 0.5"/>"#)
     };
-    // In either order of the file.
+    // The result is the same in either order of the file.
     for (first, second) in [("1 0 0", "0 0 1"), ("0 0 1", "1 0 0")] {
         let height = |rgb: &str| if rgb == "1 0 0" { "0.8" } else { "0.4" };
         let white = SUN.replace("0.7 0.6 0.5", "1 1 1");

@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// Dropped tables must meet a robot: otherwise the case would show nothing.
+    /// Dropped tables must meet a robot. Otherwise the case would have no effect.
     #[test]
     fn tables_meet_robots() {
         let case = FALL_CASES.iter().find(|case| case.name == "table_on_robot").expect("a case");

@@ -90,9 +90,9 @@ mod tests {
         }
     }
 
-    /// In the first, the solver did work, 25.8 J of 190 J, because its sweeps had not settled. In the next
-    /// three, a crushed finger left its range by up to 0.46 rad. In the last, waist and shoulder swing an
-    /// arm that whips wrist and finger to two and three times the speeds of their motors. The tip reached
+    /// In the first episode, the solver did work, 25.8 J of 190 J, because its sweeps had not settled. In the
+    /// next three, a crushed finger left its range by up to 0.46 rad. In the last, waist and shoulder swing
+    /// an arm that whips wrist and finger to two and three times the speeds of their motors. The tip reached
     /// 26.8 m/s when motors braked with no more than their pushing force.
     #[test]
     fn hard_falls_keep_to_the_limits() {

@@ -25,7 +25,7 @@ pub struct FallTrial {
     pub control_steps: u32,
     /// Number of fallen robots at the end.
     pub fallen: usize,
-    /// Place where physics gave numbers that are not finite, if it did.
+    /// Place where physics computed numbers that are not finite, if any.
     pub diverged: Option<String>,
     pub extremes: Extremes,
     /// Commands of a robot alone on a floor.

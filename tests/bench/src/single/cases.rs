@@ -28,7 +28,7 @@ pub(super) enum Plan {
         high_m: f32,
         low_m: f32,
     },
-    /// From standing to standing: a velocity along one axis for a while, both drawn by the seed.
+    /// A motion from standing to standing: a velocity along one axis for a while, both drawn by the seed.
     Pulse(PulseAxis),
     Tour(Tour),
 }

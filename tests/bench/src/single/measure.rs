@@ -11,7 +11,7 @@ use crate::report::CaseFigures;
 pub(super) const SETTLE_S: f32 = 2.0;
 /// Time after the start of motion before a velocity is measured.
 const RAMP_S: f32 = 2.0;
-/// Height above its start from which on a foot is in the air.
+/// Height above its start at which a foot is in the air.
 const LIFTED_M: f32 = 0.015;
 
 /// One control step of the log.

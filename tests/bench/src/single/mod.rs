@@ -20,7 +20,7 @@ use cases::{CASES, Case};
 pub enum Subject<'a> {
     /// A base controller, under the arms' own drives.
     Base(&'a LocomotionChoice),
-    /// A policy that drives all motors by itself.
+    /// A policy that drives all motors, without a base controller.
     Motors(&'a LocomotionChoice),
 }
 

@@ -19,7 +19,7 @@ pub(super) enum Arms {
 /// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
 const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const RAISE_S: f32 = 1.5;
-/// Start of closing. Fists press on themselves as they would on a load: targets are beyond the range of
+/// Start of closing. Fists press on themselves like on a load, because their targets are beyond the range of
 /// their joints.
 const CLOSES_AT_S: f32 = 4.0;
 const CLOSING_S: f32 = 0.3;

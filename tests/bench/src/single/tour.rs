@@ -1,5 +1,5 @@
-//! The tour: waypoints in a square, reached one after the other under punches; and one leg of it, under
-//! a hard punch.
+//! The tour: waypoints in a square, reached one after the other under punches. Another case is one side of
+//! the square, under a hard punch.
 
 use tandem_sim::{BaseCommand, BaseLimits, SplitMix64, Vector};
 
@@ -74,7 +74,8 @@ pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
         .collect()
 }
 
-/// Returns the command that walks straight to the target without turning, and stands within [`NEAR_M`] of it.
+/// Returns the command that walks straight to the target without turning, and stands once it is closer than
+/// [`NEAR_M`].
 pub(super) fn command(
     away_m: Vector,
     heading_rad: f32,

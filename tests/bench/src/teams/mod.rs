@@ -1,4 +1,4 @@
-//! Cases of several robots that carry, hold or bring something together.
+//! Cases of several robots that carry, hold or bring an object together.
 
 pub(crate) mod carrying;
 pub(crate) mod holding;

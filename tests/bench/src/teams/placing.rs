@@ -28,8 +28,8 @@ const PLACES: usize = 3;
 /// Range of the distance between places, and limit of the turn, of a robot on an empty floor.
 const AWAY_M: [f32; 2] = [0.05, 0.6];
 const TURN_RAD: f32 = FRAC_PI_2;
-/// The same of a team in the room of its task. It goes forth and back along the load's free way, since
-/// there is furniture beside it.
+/// The same values for a team in the room of its task. The team walks forth and back along the free way,
+/// since there is furniture on both sides.
 const CARRIED_AWAY_M: [f32; 2] = [0.05, 0.35];
 const CARRIED_TURN_RAD: f32 = 0.2;
 const MAX_STEPS: u32 = 1500;
@@ -40,7 +40,8 @@ struct PlaceResult {
     /// Final distance of a pelvis from its place; `off_rad` is its heading error.
     off_m: f64,
     off_rad: f64,
-    /// Horizontal displacement of wrists relative to their pelvis, after a call, against before the first.
+    /// Change of the wrists' horizontal position relative to their pelvis, from before the first call to
+    /// after this one.
     squeezed_m: f64,
 }
 

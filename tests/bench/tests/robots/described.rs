@@ -14,7 +14,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(examples.join(name)).expect("an example")
 }
 
-/// Replaces all occurrences, of which there has to be one.
+/// Replaces all occurrences. There has to be exactly one.
 #[track_caller]
 fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
     changes.iter().fold(text.to_string(), |text, (from, to)| {
@@ -66,8 +66,8 @@ fn check_survives(model: &Arc<RobotModel>, case: &str) {
     assert_eq!(found.survived, 1, "{found:?}");
 }
 
-/// The order of the joints in a limb changes nothing in what a robot can do: controller, loads on hands and
-/// frames of feet go by the tree.
+/// A robot behaves the same for any order of the joints in a limb: controller, loads on hands and frames of
+/// feet depend on the tree alone.
 #[test]
 fn joints_of_a_limb_may_have_any_order() {
     for (first, second, case) in [
@@ -212,7 +212,7 @@ fn a_robot_without_arms_is_read() {
     check_survives(&model, "stand_waving");
 }
 
-/// All reasons come at once, each with the file and the line, or the entry, and what would be right.
+/// All reasons come in one error, each with the file and the line, or the entry, and the correct form.
 #[test]
 fn all_reasons_to_refuse_a_robot_come_at_once() {
     let mjcf = replaced(
@@ -258,7 +258,7 @@ fn all_reasons_to_refuse_a_robot_come_at_once() {
     }
 }
 
-/// A draft names the joints as the example does, whatever the file calls them.
+/// A draft names the joints like the example, regardless of the names in the file.
 #[test]
 fn a_draft_finds_the_joints_of_a_robot() {
     let numbered = {
@@ -289,7 +289,7 @@ fn a_draft_finds_the_joints_of_a_robot() {
     }
 }
 
-/// Returns the reason for which a robot does not stand for a second; `None` if it does.
+/// Returns the reason why a robot does not stand for a second; `None` if it does.
 #[track_caller]
 fn falls(mjcf: &str) -> Option<String> {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -60,8 +60,8 @@ fn short_commands_move_the_base_by_speed_times_time() {
     }
 }
 
-/// The pelvis of a stepping robot is 0.62 to 0.68 m high, as the brief for policies states, whatever is
-/// commanded. It sinks to step from a higher stance, and rises to step from a lower one.
+/// The pelvis of a stepping robot is 0.62 to 0.68 m high, as the brief for policies states, even if another
+/// height is commanded. It sinks to step from a higher stance, and rises to step from a lower one.
 #[test]
 fn walks_as_high_as_policies_are_told() {
     let (mut world, mut command) = walking();

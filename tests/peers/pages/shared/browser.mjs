@@ -1,13 +1,13 @@
-// What the scripts beside this folder share: a headless Chromium whose pages are listened to, pictures of them for
-// somebody to look at, and what axe finds wrong with them.
+// Shared parts of the scripts in the parent folder: a headless Chromium whose page errors are collected, pictures of pages for
+// inspection, and the problems that axe finds.
 //
 //     cargo build --release
 //     (cd tests/peers/pages && npm ci --ignore-scripts)
 //     mkdir -p /tmp/pages && cd /tmp/pages
 //     node REPOSITORY/tests/peers/pages/operate.mjs REPOSITORY/target/release/tandem
 //
-// Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder. For whoever changes the pages: the files
-// of the folder TANDEM_WEB are shown in place of those in the program.
+// Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder. During work on the pages, the files
+// of the folder TANDEM_WEB replace those in the program.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -18,13 +18,13 @@ import { deadline } from "./server.mjs";
 export * from "./server.mjs";
 
 export const WIDTHS = [400, 1400, 2500];
-/** Of a window that nobody looks at: software draws it. */
+/** Flags for a window without a display, drawn in software. */
 export const SIZE = { width: 800, height: 600 };
-/** How long a page may take on a machine that has other things to do. */
+/** Maximum time of a page on a busy machine. */
 export const PATIENCE_MS = 120_000;
-/** How many minutes a whole script may take there. */
+/** Maximum time of a whole script there, in minutes. */
 const PATIENCE_MIN = 30;
-/** What pages have said of themselves that they should not have. */
+/** Errors and warnings that pages have logged. */
 export const complaints = [];
 
 const sources = process.env.TANDEM_WEB;
@@ -40,7 +40,7 @@ export const browser = await chromium.launch({
 });
 
 /**
- * Opens the page of a person who shares nothing with others. `before` runs in it before anything of its own does.
+ * Opens the page of a person in a separate context. `before` runs in the page before its own scripts.
  * @param {string} link
  * @param {import("playwright-core").BrowserContextOptions & { before?: any }} [options]
  */
@@ -56,7 +56,7 @@ export async function open(link, { before, ...options } = {}) {
     if (origin !== new URL(link).origin && protocol !== "blob:") complaints.push(`asks ${request.url()}`);
   });
   if (sources) {
-    // The page itself stays the server's: one that came from elsewhere may open no socket to this machine.
+    // The page itself still comes from the server, because a page from another origin may not open a socket to this machine.
     await context.route(/\/(home|watch|operate)\/page\./, (route) => {
       const name = new URL(route.request().url()).pathname.endsWith("css") ? "style.css" : "dist/page.js";
       return route.fulfill({ path: join(sources, name) });
@@ -66,7 +66,7 @@ export async function open(link, { before, ...options } = {}) {
   return page;
 }
 
-/** Keeps pictures of a page, narrow and wide, light and dark, which is nowhere wider than its window, and has axe look at it. */
+/** Takes pictures of a page, narrow and wide, light and dark. Checks that it is never wider than its window, and runs axe. */
 export async function pictures(page, name, { heights = {}, settleMs = 0 } = {}) {
   const before = page.viewportSize();
   for (const colorScheme of ["light", "dark"]) {
@@ -85,7 +85,7 @@ export async function pictures(page, name, { heights = {}, settleMs = 0 } = {}) 
   await page.setViewportSize(before);
 }
 
-/** Scrolls through a page and back: a browser paints what is scrolled of its own, such as a list, only where it has been in sight. */
+/** Scrolls through a page and back, because a browser paints scrollable parts, such as lists, only once they have been visible. */
 async function paintAll() {
   for (let top = 0; top < document.documentElement.scrollHeight; top += innerHeight / 2) {
     scrollTo(0, top);
@@ -95,7 +95,7 @@ async function paintAll() {
   await new Promise((drawn) => { requestAnimationFrame(drawn); });
 }
 
-/** Has axe look at a page, which must find nothing serious. */
+/** Runs axe on a page, which must find no serious problem. */
 export async function accessible(page, name) {
   if (!await page.evaluate(() => Boolean(window.axe))) await page.evaluate(axe);
   const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
@@ -105,7 +105,7 @@ export async function accessible(page, name) {
   assert.deepEqual(serious.map(({ id }) => id), [], `axe finds something serious on ${name}`);
 }
 
-/** Runs in a page before it: counts the pictures in which the page has drawn anything. */
+/** Runs in a page before its scripts, and counts the frames in which the page has drawn. */
 export function countDrawn() {
   window.drawn = 0;
   let drawing = false;
@@ -122,7 +122,7 @@ export function countDrawn() {
   requestAnimationFrame(count);
 }
 
-/** Pictures of the scene that such a page draws in a second. */
+/** Returns the number of frames of the scene that such a page draws in a second. */
 export async function drawnRate(page, seconds = 3) {
   const [began, before] = [performance.now(), await page.evaluate(() => window.drawn)];
   await page.waitForTimeout(1000 * seconds);

@@ -1,4 +1,4 @@
-"""The program of the book's page `unitree.md` runs as it is printed there; the waist has turned when it ends.
+"""The program of the book's page `unitree.md` runs unchanged. At its end the waist has turned.
 
 `run.py` starts it with the DDS domain of the robot.
 """

@@ -1,4 +1,4 @@
-"""Unitree's C++ SDK, by its binding `far-unitree-sdk`, drives robot A, which is in domain 0 as this SDK always is.
+"""Unitree's C++ SDK, by its binding `far-unitree-sdk`, drives robot A, which is in domain 0, the only one of this SDK.
 
 Commands are ignored until the mode is released; the SDK drops states with a wrong checksum and then tells zeros.
 """
@@ -28,7 +28,7 @@ assert state.mode_machine == 5 and abs(resting[KNEE]) > 0.1, "no state, or one w
 
 
 def moved(seconds):
-    """Commands a turn of the waist, and returns by how much it and the knee have turned."""
+    """Commands a turn of the waist, and returns the angles by which the waist and the knee have turned."""
     command = robot.create_zero_command()
     goal = list(resting)
     goal[WAIST_YAW] += 0.3

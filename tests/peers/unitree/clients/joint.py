@@ -1,4 +1,4 @@
-"""Unitree's Python SDK drives every motor of robot A: gains act on legs, too, and nobody balances.
+"""Unitree's Python SDK drives every motor of robot A: gains also act on the legs, and no controller balances.
 
 `run.py` starts it with the DDS domain of the robot, whose bridge has `--joint-control`.
 """
@@ -42,7 +42,7 @@ def command(targets, stiff):
 
 
 def drive(targets, seconds, stiff):
-    """Sends a command at 250 Hz; returns how far each leg's torque is from its law, at the last state [N m]."""
+    """Sends a command at 250 Hz; returns the difference of each leg's torque from its law, at the last state [N m]."""
     message = command(targets, stiff)
     for _ in range(int(250 * seconds)):
         robot.send(message)

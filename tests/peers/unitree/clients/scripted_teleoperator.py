@@ -1,4 +1,4 @@
-"""A teleoperator of LeRobot that no person holds: it swings the arms and the waist of a G1 about the pose at its start."""
+"""A teleoperator of LeRobot without a person. It swings the arms and the waist of a G1 about the pose at its start."""
 
 import math
 import time
@@ -16,11 +16,11 @@ STANDING_RAD |= {"kLeftAnklePitch": -0.2, "kRightAnklePitch": -0.2}
 @TeleoperatorConfig.register_subclass("scripted")
 @dataclass
 class ScriptedTeleoperatorConfig(TeleoperatorConfig):
-    """Nothing can be set."""
+    """Configuration without settings."""
 
 
 class ScriptedTeleoperator(Teleoperator):
-    """The script as LeRobot sees it."""
+    """The script in the form of LeRobot's class."""
 
     config_class = ScriptedTeleoperatorConfig
     name = "scripted"

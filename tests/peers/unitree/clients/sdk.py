@@ -51,7 +51,7 @@ def q(motor):
 
 
 def check_states():
-    """Every topic comes at its rate, and the checksum is right."""
+    """Checks the rate and the checksum of every topic."""
     time.sleep(1.0)
     before, begun_s = dict(counts), time.time()
     time.sleep(2.0)
@@ -68,7 +68,7 @@ def check_states():
 
 
 def check_services():
-    """Calls are answered: what can be done is done, and the rest gets 3203."""
+    """Checks that supported calls are executed, and that all others get 3203."""
     switcher = MotionSwitcherClient()
     switcher.SetTimeout(5.0)
     switcher.Init()
@@ -95,7 +95,7 @@ def check_services():
 
 
 def check_arms():
-    """`rt/arm_sdk` moves the joints by its weight, and a wrong checksum moves nothing."""
+    """Checks that `rt/arm_sdk` moves the joints by its weight, and that a message with a wrong checksum is ignored."""
     publisher, crc = ChannelPublisher("rt/arm_sdk", LowCmd_), CRC()
     publisher.Init()
     command = unitree_hg_msg_dds__LowCmd_()

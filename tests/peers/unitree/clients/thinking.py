@@ -1,4 +1,4 @@
-"""A program that thinks for 4 s between its commands: under the clock `hold` the tick of states stands still meanwhile.
+"""A program that thinks for 4 s between its commands: under the clock `hold` the tick of states is paused meanwhile.
 
 `run.py` starts it with the DDS domain of the robot and the clock.
 """

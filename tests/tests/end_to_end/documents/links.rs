@@ -10,7 +10,7 @@ use super::pages::{BOOK, CONTENTS, Page, all_documents, page, pages, paths_below
 /// Maximum number of lines of README; details belong in the book.
 const README_LINES: usize = 150;
 
-/// Folder of the API references, which `.ci/site` adds to the built book; it checks the links to them.
+/// Folder of the API references, which `.ci/site` adds to the built book and whose links it checks.
 const REFERENCES: &str = "api/";
 
 /// Returns the links of a page with their lines.

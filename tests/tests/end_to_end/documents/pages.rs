@@ -1,4 +1,4 @@
-//! Pages: README, the other documents beside it, and the book, with their code blocks and prose.
+//! Pages: README, the other documents in its folder, and the book, with their code blocks and prose.
 
 use std::{
     fs,

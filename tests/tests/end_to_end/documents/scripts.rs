@@ -1,5 +1,5 @@
-//! Tests that run the scripts of the pages: all `sh,run` blocks of a page are one script, with a server
-//! and a folder of its own.
+//! Tests that run the scripts of the pages. All `sh,run` blocks of a page are one script, with its own server
+//! and folder.
 //!
 //! The path begins with three programs of ours: `tandem`, which is this test program; `cargo`, which runs
 //! it; and `curl`, which fails on an error status.

@@ -119,7 +119,7 @@ fn words(text: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Collects every subcommand that can be called by itself, with its flags.
+/// Collects every subcommand that can be called alone, with its flags.
 fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<Flag>)>) {
     let mut below = command.get_subcommands().peekable();
     if below.peek().is_none() || !command.is_subcommand_required_set() {

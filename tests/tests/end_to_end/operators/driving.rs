@@ -149,7 +149,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     let moved = [0, 1].map(|robot| apart_m(before[robot], pages[0].wrist_m(robot)));
     assert!(moved[0] > 0.1 && moved[1] < 0.02, "{moved:?}");
 
-    // B leaves: time stops, and A learns for whom the episode waits.
+    // B leaves: time stops, and A learns the name of the robot for which the episode waits.
     let [mut a, b] = pages;
     drop(b);
     std::thread::sleep(Duration::from_millis(300));

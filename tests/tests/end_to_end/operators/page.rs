@@ -53,7 +53,7 @@ fn two_people_drive_and_time_stands_still_while_one_is_away() {
     let steps = || team.server.get(&format!("/v1/episodes/{}", team.id)).ok()["env_steps"].clone();
     let before = steps();
     std::thread::scope(|scope| {
-        // B is absent: A's command waits, and the world with it.
+        // B is absent: A's command waits, and so does the world.
         let waiting = scope.spawn(|| team.ask(0, "move_wrists", tick("A", 0.25)));
         std::thread::sleep(std::time::Duration::from_secs(1));
         assert!(!waiting.is_finished());

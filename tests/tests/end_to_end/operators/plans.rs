@@ -42,7 +42,7 @@ fn an_operator_waits_in_one_call_until_it_hears() {
             team.ask(0, "wait", json!({ "steps": 10 })).ok();
         }
         team.ask(0, "say", json!({ "text": "IN PLACE" })).ok();
-        // What is said is heard with the reply to the next command.
+        // A message arrives with the reply to the next command.
         team.ask(0, "wait", json!({ "steps": 10 })).ok();
         waits.join().expect("B's reply")
     });
@@ -84,7 +84,8 @@ fn operators_meet_where_both_wait() {
     team.verified();
 }
 
-/// Words end a walk, a plan, and a wait for one operator; those of a robot that carries, once it stands.
+/// A message ends a walk, a plan, and a wait for one operator. The walk of a robot that carries ends once it
+/// stands.
 #[test]
 fn words_end_what_was_asked_to_end_by_them() {
     let team = Team::start(json!({ "talk": true, "patience_s": 5 }));

@@ -152,7 +152,7 @@ fn who_keeps_silent_is_held_and_told_so() {
     }
     let late = || team.ask(1, "wait", json!({ "steps": 5 }));
     late().refused(409, &["robot \"B\" was held still from step 0 to 10", "look again"]);
-    // From here on B is waited for, and its next command counts.
+    // From here on the round waits for B, and its next command counts.
     let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
     let replies = [a.ok(), b.ok()];
     assert_eq!(replies.map(|reply| reply["step"].clone()), [15, 15]);
@@ -304,7 +304,7 @@ fn only_who_asks_for_operators_gets_them() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
 }
 
-/// An operator's texts are about its own robot and what it may do.
+/// An operator's texts describe its own robot and the calls that it may make.
 #[test]
 fn an_operators_tools_are_its_own() {
     let team = Team::start(json!({ "talk": true }));

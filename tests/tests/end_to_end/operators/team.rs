@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use tandem_episodes::{Recorder, Recording, replay};
 use tandem_tests::{Answer, TestServer};
 
-/// An episode with operators, on a server of its own.
+/// An episode with operators, on a separate server.
 pub struct Team {
     pub server: TestServer,
     pub id: String,

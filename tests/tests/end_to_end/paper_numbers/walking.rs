@@ -24,7 +24,7 @@ fn trash_collection() {
     for axis in SIDEWAYS {
         scene.threshold(2, table::BIN_DELIVERED_M, false, |facts, off_m| deliver(facts, axis * off_m));
     }
-    // Height of the bench, on whose top the bottle stands.
+    // Height of the bench on which the bottle stands.
     let bench_m = |facts: &Facts| {
         let bottle = facts.object("pet_bottle");
         bottle.model.lowest_m(&bottle.pose_in_world)
@@ -48,7 +48,7 @@ fn trash_collection() {
     assert!(!scene.done(3, |facts| deliver(facts, Vector::ZERO)), "the bottle is on the bench");
 }
 
-/// Returns the state of hands that touch nothing, for all robots.
+/// Returns the state of hands without contacts, for all robots.
 fn hands_off(facts: &Facts) -> Vec<Sides<Grip>> {
     vec![Sides::both(Grip::Off); facts.robots.len()]
 }

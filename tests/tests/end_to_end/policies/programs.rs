@@ -170,7 +170,7 @@ fn a_program_may_end_its_episode_in_any_way() {
     }
 }
 
-/// Clients of HTTP tell only the status of a refusal.
+/// HTTP clients report only the status of a refusal.
 #[test]
 fn a_program_that_dies_of_a_refusal_is_told_why_it_was_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");

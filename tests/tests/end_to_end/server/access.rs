@@ -1,5 +1,5 @@
-//! Tests of a server with a token: callers without it receive no information, and nothing that callers
-//! send is logged.
+//! Tests of a server with a token: callers without it receive no information, and no text of callers is
+//! logged.
 
 use std::{
     io,
@@ -18,7 +18,7 @@ fn server() -> TestServer {
     TestServer::with(Layer { token, ..Layer::default() })
 }
 
-/// Routes of all kinds, some of which exist.
+/// Routes of all kinds, including some that do not exist.
 const ROUTES: [(&str, &str); 12] = [
     ("GET", "/"),
     ("GET", "/v1/episodes"),

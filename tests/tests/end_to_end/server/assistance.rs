@@ -1,6 +1,6 @@
-//! Tests of assistance in everything that reaches a policy: replies over REST and MCP, replies to
-//! operators, observations after commands, briefs, prompts, and the texts of tools. They contain the
-//! benchmark's information, or all of it.
+//! Tests of assistance in all texts that reach a policy: replies over REST and MCP, replies to operators,
+//! observations after commands, briefs, prompts, and the texts of tools. They contain the benchmark's
+//! information, or all information.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;
@@ -69,7 +69,7 @@ fn over_mcp(server: &TestServer, tool: &str, args: Value) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
-/// Returns every reply with fields of its own, and how it was obtained.
+/// Returns every kind of reply with its fields and the way in which it was obtained.
 fn replies(server: &TestServer) -> Vec<(&'static str, Value)> {
     let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
     let started = server.post("/v1/episodes", &start).ok();

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
 use tandem_tests::TestServer;
 
-/// Sends raw bytes and returns everything received until the server closes the connection.
+/// Sends raw bytes and returns all bytes received until the server closes the connection.
 fn raw(server: &TestServer, request: &str) -> String {
     let mut stream = TcpStream::connect(server.address).expect("a connection");
     stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a timeout");
@@ -265,7 +265,7 @@ fn an_address_keeps_so_many_connections_waiting_and_no_more() {
     let server = with_token(Layer { max_requests: Some(4), ..Layer::default() });
     let mut known = Kept::open(&server);
     assert_eq!(known.ask("/healthz", TOKEN), Some(200));
-    // 64 connections may wait, one of which has made a valid call.
+    // There are 64 waiting connections, including one with a valid call.
     let mut waiting: Vec<Kept> = (0..67).map(|_| Kept::open(&server)).collect();
     for kept in &mut waiting[..4] {
         kept.wait_for_the_end();

@@ -4,7 +4,7 @@ use syn::visit::{self, Visit};
 
 use super::sources::{Source, everywhere, expect_none};
 
-/// First words of comments that say what is asked, not what there is.
+/// First words of comments that ask a question instead of describing the item.
 const QUESTIONS: [&str; 9] = ["What", "Where", "Who", "Whether", "Of", "As", "How", "Which", "Whose"];
 /// Columns of a line with a comment.
 const MAX_COMMENT_COLUMNS: usize = 112;

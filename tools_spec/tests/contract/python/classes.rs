@@ -9,10 +9,10 @@ use super::text::{Lines, docstring};
 use super::types::{Parameter, parameters, python_name, reference, reply_type};
 use super::{OF_DEPTH, OF_OBSERVE, OF_PLANS, OF_RESULT, OF_START, described, is_method};
 
-/// The class of all replies, which reads them.
+/// Base class of all replies, which parses them.
 const BASE: &str = "Reply";
 
-/// The types of the contract, by what they are part of.
+/// The types of the contract, by the types that contain them.
 pub struct Contract<'a> {
     types: &'a Map<String, Value>,
     arguments: BTreeSet<String>,
@@ -43,7 +43,7 @@ impl<'a> Contract<'a> {
             start: BTreeSet::new(),
         };
         let on_episode = || tools.iter().filter(|tool| is_method(tool));
-        // All commands have the same reply, and no other tool has one that another has, too.
+        // All commands have the same reply. Every other tool has a separate one.
         let is_common = |reply: &str| on_episode().filter(|tool| tool.reply == reply).count() > 1;
         let all_of = |names: Vec<&str>, but: &[&BTreeSet<String>]| -> BTreeSet<String> {
             let all = names.into_iter().flat_map(|name| contract.reached_from(name));
@@ -63,14 +63,14 @@ impl<'a> Contract<'a> {
         Contract { arguments, commands, plans, depth, replies, result, start, ..contract }
     }
 
-    /// Classes and names for choices that a schema refers to itself.
+    /// Classes and enumerations to which a schema itself refers.
     pub fn named_in(&self, schema: &Value) -> Vec<String> {
         let mut found = Vec::new();
         references(schema, &mut found);
         found
     }
 
-    /// Returns all that a schema is made of.
+    /// Returns all parts of a schema.
     fn reached(&self, schema: &Value) -> BTreeSet<String> {
         let mut reached = BTreeSet::new();
         let mut next = self.named_in(schema);
@@ -91,7 +91,7 @@ impl<'a> Contract<'a> {
         self.types[name]["properties"].is_object()
     }
 
-    /// Returns true if it is one of several texts that replies have, too, whose modules define it.
+    /// Returns true for an enumeration that replies have, too; their modules define it.
     pub fn is_replied(&self, name: &str) -> bool {
         !self.is_class(name)
             && [&self.commands, &self.depth, &self.replies, &self.result]
@@ -99,14 +99,15 @@ impl<'a> Contract<'a> {
                 .any(|names| names.contains(name))
     }
 
-    /// Returns the type of a name that has no class and is no choice, as that of numbers by joint.
+    /// Returns the type of a name that has no class and is no enumeration, for example that of numbers by
+    /// joint.
     fn plain(&self, name: &str) -> Option<String> {
         let schema = &self.types[name];
         let named = self.is_class(name) || choices(schema).is_some();
         (!named).then(|| reply_type(schema, &|name| self.plain(name)))
     }
 
-    /// Returns the module of what tools are given.
+    /// Returns the module of the tools' arguments.
     pub fn arguments(&self) -> String {
         let mut lines = head("Arguments of tools.");
         lines.add(0, "from collections.abc import Mapping, Sequence");
@@ -144,32 +145,32 @@ impl<'a> Contract<'a> {
         }
     }
 
-    /// Returns the module of what commands reply.
+    /// Returns the module of the replies to commands.
     pub fn commands(&self) -> String {
         self.reply_module("Replies to commands.", &self.commands)
     }
 
-    /// Returns the module of what plans and walks reply.
+    /// Returns the module of the replies to plans and walks.
     pub fn plans(&self) -> String {
         self.reply_module("Replies to plans and walks.", &self.plans)
     }
 
-    /// Returns the module of what is told of points and surfaces.
+    /// Returns the module of measured points and surfaces.
     pub fn depth(&self) -> String {
         self.reply_module("Replies to query_depth.", &self.depth)
     }
 
-    /// Returns the module of what other tools of an episode reply.
+    /// Returns the module of the replies of an episode's other tools.
     pub fn replies(&self) -> String {
         self.reply_module("Replies to tools that are no commands.", &self.replies)
     }
 
-    /// Returns the module of what an episode came to.
+    /// Returns the module of an episode's result.
     pub fn result(&self) -> String {
         self.reply_module("Results of episodes.", &self.result)
     }
 
-    /// Returns the module of what a start and a list of tasks reply.
+    /// Returns the module of the replies to starts and to lists of tasks.
     pub fn start(&self) -> String {
         self.reply_module("Replies to a start, and lists of tasks.", &self.start)
     }
@@ -194,7 +195,7 @@ impl<'a> Contract<'a> {
         lines.text()
     }
 
-    /// Imports types of replies from where they are.
+    /// Imports types of replies from their modules.
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
         for (module, own) in [
             ("commands", &self.commands),
@@ -215,7 +216,7 @@ impl<'a> Contract<'a> {
         }
     }
 
-    /// Returns the name for the texts of a type that is one of several; nothing of another type.
+    /// Returns the name of an enumeration of texts; `None` for another type.
     fn choices(&self, lines: &mut Lines, name: &str) {
         let Some(values) = choices(&self.types[name]) else { return };
         lines.add(0, "");
@@ -264,7 +265,7 @@ fn head(about: &str) -> Lines {
     lines
 }
 
-/// Returns the texts of a type that is one of several.
+/// Returns the texts of an enumeration.
 fn choices(schema: &Value) -> Option<Vec<String>> {
     let text = |value: &Value| value.as_str().map(str::to_owned);
     if let Some(values) = schema["enum"].as_array() {

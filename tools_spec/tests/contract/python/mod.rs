@@ -16,7 +16,7 @@ use classes::Contract;
 use text::{Lines, docstring};
 use types::Parameter;
 
-/// The package answers it with pictures as arrays, which JSON Schema does not know.
+/// The package's own method returns images as arrays, which JSON Schema cannot express.
 const OBSERVE: &str = "observe";
 /// Replies beside images.
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];

@@ -32,7 +32,7 @@ impl Lines {
     pub fn import(&mut self, module: &str, names: impl Iterator<Item = String>) {
         let names: BTreeSet<String> = names.collect();
         let mut names: Vec<String> = names.into_iter().collect();
-        // As ruff has them: classes before functions.
+        // Names are sorted as by ruff: classes before functions.
         names.sort_by_key(|name| (name.starts_with(char::is_lowercase), name.clone()));
         let whole = format!("from .{module} import {}", names.join(", "));
         match names.len() {

@@ -1,4 +1,4 @@
-//! From JSON Schema to Python's types, and to the expressions that read them.
+//! Conversion of JSON Schema to Python's types, and to the expressions that parse them.
 
 use serde_json::Value;
 
@@ -6,9 +6,9 @@ use super::described;
 
 /// An argument of a tool, or a field of a class.
 pub struct Parameter {
-    /// The wire's.
+    /// Name on the wire.
     pub wire: String,
-    /// Python's, which has words of its own.
+    /// Name in Python, where some names are keywords.
     pub name: String,
     pub kind: String,
     pub about: String,
@@ -20,7 +20,7 @@ pub fn parameters(schema: &Value) -> Vec<Parameter> {
     let properties = schema["properties"].as_object().into_iter().flatten();
     let parameter = |(wire, of): (&String, &Value)| {
         let (kind, may_be_null) = argument_type(of);
-        // None is left out, and what is left out has its default.
+        // `None` is not sent, and a field that is not sent has its default.
         let may_be_null = may_be_null || !of["default"].is_null();
         Parameter {
             wire: wire.clone(),
@@ -67,7 +67,7 @@ pub fn without_null(schema: &Value) -> (Value, bool) {
     (schema.clone(), false)
 }
 
-/// Returns the type of what a caller gives.
+/// Returns the type of a value from a caller.
 fn argument_type(schema: &Value) -> (String, bool) {
     let (schema, may_be_null) = without_null(schema);
     let kind = match schema["type"].as_str() {
@@ -85,7 +85,7 @@ fn is_numbers(schema: &Value) -> bool {
         && (items["type"] == "number" || items["type"] == "integer" || is_numbers(items))
 }
 
-/// Returns the type of what is replied.
+/// Returns the type of a value in a reply.
 pub fn reply_type(schema: &Value, plain: &dyn Fn(&str) -> Option<String>) -> String {
     let (schema, may_be_null) = without_null(schema);
     let kind = match schema["type"].as_str() {

@@ -65,7 +65,7 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
     assert!(told.contains("further ones, which are added to it (--shard I/N"), "{told}");
     assert_eq!(std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap(), before);
 
-    // The same run continues, and so does one with more of the same.
+    // The same run continues, and so does a run with additional tasks or seeds.
     let kept = |plan: &EvaluationPlan| {
         let KeptEpisodes { kept, to_play, .. } = EvaluationRun::begin(plan, folder.path()).unwrap().kept();
         (kept, to_play)
@@ -125,7 +125,7 @@ fn results_of_another_build_are_kept_and_marked() {
     assert_eq!(run.kept(), kept);
     assert_eq!(run.so_far().other_builds, [("0.0.1+older".to_owned(), 1)].into());
     drop(run);
-    // From now on it is a run of this build, which lists the other.
+    // From this moment the folder is a run of this build, which lists the other build.
     assert_eq!(EvaluationRun::begin(&own, folder.path()).unwrap().kept(), kept);
 }
 

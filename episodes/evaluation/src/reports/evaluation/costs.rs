@@ -65,7 +65,7 @@ impl ModelCosts {
     }
 }
 
-/// Model costs of episodes that count, and of those that do not, which cost as much.
+/// Model costs of episodes that count, and of those that do not, which are paid for as well.
 #[derive(Debug, Serialize)]
 pub struct AskedCosts {
     pub counted: CostSum,
@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// Compares an expert without notes with an agent of which half of the episodes have notes.
+    /// Compares an expert without notes with an agent that has notes in half of its episodes.
     #[test]
     fn agents_are_compared_by_what_their_notes_say() {
         let mut episodes = nine_six_three("agent");

@@ -104,12 +104,12 @@ impl RunSettings {
 
 /// Returns the times at which the first and the last of these episodes ended; `None` if no result has them.
 pub fn ended_between(played: &[&PlayedEpisode]) -> Option<[String; 2]> {
-    // Times of one format are in the order of their texts.
+    // Times in the same format sort like their texts.
     let times = || played.iter().filter_map(|played| played.ended_at.clone());
     Some([times().min()?, times().max()?])
 }
 
-/// Formats a span of times as days, for example `2026-11-28`, or two of them.
+/// Formats a span of times as one or two days, for example `2026-11-28`.
 pub fn days([first, last]: &[String; 2]) -> String {
     let day = |time: &str| time.split('T').next().unwrap_or_default().to_owned();
     let (first, last) = (day(first), day(last));

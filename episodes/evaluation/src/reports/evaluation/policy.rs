@@ -38,7 +38,7 @@ pub struct PolicyReport {
     pub protocol: &'static str,
     pub locomotion: String,
     pub build: String,
-    /// Number of episodes that count. Figures refer to these, unless they are on excluded ones.
+    /// Number of episodes that count. The figures refer to these, unless they are about excluded episodes.
     pub episodes: usize,
     pub falls: u32,
     /// The tasks that were played, in the order of the list of tasks.
@@ -53,7 +53,7 @@ pub struct PolicyReport {
     /// Extra information that it was shown beyond the benchmark's own policies.
     pub shown: Vec<ShownReport>,
     pub reasons: Vec<FailureReason>,
-    /// Episodes that say nothing about the policy's performance.
+    /// Episodes that are no evidence of the policy's performance.
     pub excluded: Vec<ExcludedEpisodes>,
     /// Episodes that were played more than once, because earlier attempts did not count.
     pub played_again: Vec<RepeatedEpisode>,
@@ -90,9 +90,9 @@ pub struct PhaseReport {
     pub cumulative: Option<Rate>,
     /// Simulated times at which these episodes reached it, in ascending order.
     pub reached_s: Vec<f64>,
-    /// Rate among the episodes that reached the phase before it.
+    /// Rate among the episodes that reached the previous phase.
     pub conditional: Option<Rate>,
-    /// Rate among the episodes that began at it.
+    /// Rate among the episodes that began at this phase.
     pub from_its_beginning: Option<Rate>,
 }
 
@@ -213,7 +213,7 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
         named(&card.full_name(), &spec.peculiarities()),
         address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
-        // Departures name files alone, whose content or folder may differ.
+        // Departures contain only the names of files. Their contents or folders may differ.
         played.locomotion.clone(),
         spec.robot.name(),
         spec.scene.as_ref().map(|scene| format!("scene {}", scene.xxh3)).unwrap_or_default(),

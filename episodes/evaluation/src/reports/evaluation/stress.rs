@@ -49,7 +49,7 @@ pub struct StressRow {
 /// Rates of the same episodes with and without stress.
 #[derive(Debug, Serialize)]
 pub struct PairedLoss {
-    /// Pairs of outcomes, the first without stress, the second with it.
+    /// Pairs of outcomes: without stress, and with it.
     pub pairs: Pairs,
     /// Rate under stress minus rate without.
     pub difference_share: f64,
@@ -327,8 +327,8 @@ mod tests {
     use crate::reports::evaluation::{EvaluationReport, ReportFormat, ReportPictures, load};
     use tandem_episodes::stress::StressLevel;
 
-    /// Returns a report on twenty seeds of Handover without stress, of which 18 succeed, and under two axes
-    /// at two levels.
+    /// Returns a report on twenty seeds of Handover: without stress, where 18 succeed, and under two axes at
+    /// two levels.
     fn under_stress() -> EvaluationReport {
         let task = tasks::find("handover").unwrap();
         let episode = |stress: Option<(StressAxis, StressLevel)>, seed: u32, succeeds: bool| {

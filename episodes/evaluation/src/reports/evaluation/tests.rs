@@ -58,7 +58,7 @@ pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpis
     }
 }
 
-/// Returns ten episodes of Handover, of which nine, six and three reach its phases.
+/// Returns ten episodes of Handover. Nine, six and three of them reach its phases.
 pub fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
@@ -200,8 +200,8 @@ fn joint_targets_beyond_limits_are_told_where_there_were_some() {
     assert!(text(&episodes).contains("| agent | handover | 34 |"), "{}", text(&episodes));
 }
 
-/// Extra information that a policy was shown in some of its episodes is named and counted. It does not make
-/// another policy of it.
+/// Extra information that a policy was shown in some of its episodes is named and counted. The policy still
+/// counts as the same one.
 #[test]
 fn what_was_shown_beyond_the_benchmark_is_told() {
     let mut episodes = nine_six_three("agent");
@@ -267,7 +267,7 @@ fn means_of_phases_are_by_number_of_robots() {
     }
 }
 
-/// Every format, for a policy whose name has to be escaped everywhere.
+/// Tests every format with a policy whose name has to be escaped everywhere.
 #[test]
 fn reports_quote_what_they_are_told() {
     let mut episodes = nine_six_three("a<b>&\"|_,%");
@@ -330,7 +330,8 @@ fn an_episode_that_was_played_again_is_listed() {
         played
     };
     let mut episodes = nine_six_three("one");
-    // One was played again in another folder, one in the same, and one as often as the limit allows.
+    // One episode was played again in another folder, one in the same folder, and one as often as the limit
+    // allows.
     episodes[0].attempts = failed(0, "no plan").into_attempts();
     episodes.push(failed(3, "crash"));
     let attempts = failed(21, "no plan").into_attempts();
@@ -412,7 +413,7 @@ fn results_of_earlier_versions_are_read() {
         None,
         "it is written only where it is set"
     );
-    // In these files, disclosure and hints alone describe the information for policies, or nothing does.
+    // In these files, the information for policies is described by disclosure and hints alone, or not at all.
     let spec = old["spec"].as_object_mut().unwrap();
     assert!(spec.remove("assistance").is_some() && spec.remove("hints").is_some());
     spec.insert("disclosure".into(), "end".into());

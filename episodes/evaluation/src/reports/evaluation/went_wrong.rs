@@ -85,7 +85,7 @@ impl Watcher {
     fn look(&mut self, facts: &Facts, reached: bool, names: &[&str]) {
         self.last_s = facts.time_s;
         if reached {
-            // A reached phase makes good a drop, but not a fall.
+            // A phase that is reached after a drop cancels the drop, but not a fall.
             self.found = self.found.take().filter(|(_, what)| what.ends_with("fell"));
         }
         self.held_s.resize(facts.objects.len(), None);

@@ -1,5 +1,5 @@
-//! Leaderboard: one table of policies and models from many run folders, with the benchmark's published figures
-//! beside them. Unknown cells are empty.
+//! Leaderboard: one table of policies and models from many run folders, together with the benchmark's
+//! published figures. Unknown cells are empty.
 
 mod published;
 mod rows;
@@ -24,7 +24,7 @@ pub struct Leaderboard {
     pub policies: Vec<BoardRow>,
     /// Each policy and published method on each of its tasks.
     pub tasks: Vec<BoardRow>,
-    /// Episodes with a page that shows what the policy said, called and read.
+    /// Episodes with a page that shows the policy's thoughts, calls and observations.
     pub transcripts: Vec<TranscriptLink>,
     /// Files that could not be read, with the reasons.
     pub skipped: Vec<String>,

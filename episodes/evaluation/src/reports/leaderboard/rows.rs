@@ -190,8 +190,8 @@ fn costs(episodes: &[&BoardEpisode]) -> BoardCosts {
 }
 
 impl BoardEpisode<'_> {
-    /// Returns the link to the page of the episode; `None` if it has none, or its policy said and read
-    /// nothing.
+    /// Returns the link to the page of the episode. `None` if there is no page, or if the policy wrote no
+    /// notes.
     fn transcript(&self, folder: &Path) -> Option<TranscriptLink> {
         let played = &self.found.played;
         Some(TranscriptLink {

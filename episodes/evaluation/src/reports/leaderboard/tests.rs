@@ -49,7 +49,7 @@ fn what_was_played_by_other_rules_is_another_row() {
     assert_eq!((phases.successes, phases.trials), (18, 30));
 }
 
-/// A task of a suite adds to a policy's row, and is a row of its own by task.
+/// A task of a suite contributes to its policy's row. By task, it has a row itself.
 #[test]
 fn tasks_of_one_policy_are_one_row_and_a_row_each() {
     let mut episodes = nine_six_three("agent");

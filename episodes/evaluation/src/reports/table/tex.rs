@@ -2,11 +2,11 @@
 
 use super::Table;
 
-/// Largest number of rows on one page; longer tables are broken across pages.
+/// Maximum number of rows on one page; longer tables are broken across pages.
 const MAX_PAGE_ROWS: usize = 40;
 /// Length from which a column's texts are broken into lines, in characters.
 const LONG_TEXT_CHARS: usize = 36;
-/// Command that scales what follows down to the width of the text, and up never.
+/// Command that scales the following table down to the width of the text if it is wider.
 const WITHIN_THE_PAGE: &str = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}";
 
 /// Renders a table with its title and note as the caption.
@@ -44,8 +44,8 @@ fn columns(table: &Table) -> String {
     (0..table.head.len()).map(column).collect()
 }
 
-/// Joins the cells of a row. A bracket or a star at its beginning would be an argument of the line break
-/// before it.
+/// Joins the cells of a row. At the beginning of a row, LaTeX would read a bracket or a star as an argument
+/// of the line break before.
 fn row(cells: &[String]) -> String {
     let text = cells.iter().map(|cell| escape_tex(cell)).collect::<Vec<_>>().join(" & ");
     if text.starts_with(['[', '*']) { format!("{{}}{text}") } else { text }
@@ -83,7 +83,7 @@ pub fn escape_tex(text: &str) -> String {
             '°' => escaped += "$^\\circ$",
             '–' => escaped += "--",
             '’' => escaped.push('\''),
-            // Two in a row would be a dash.
+            // LaTeX would print two hyphens in a row as a dash.
             '-' if escaped.ends_with('-') => escaped += "{}-",
             character if character.is_whitespace() => escaped.push(' '),
             character if character.is_ascii_graphic() || is_accented(character) => escaped.push(character),

@@ -1,6 +1,6 @@
-//! The SetTheTable expert: each robot takes one thing after another from its sideboard, turns to the table
-//! and puts it on its place. Both work at the same time, each on its side, and begin where nothing is below
-//! the idle left hand.
+//! The SetTheTable expert: each robot takes one object after another from its sideboard, turns to the table
+//! and puts the object on its place. Both work at the same time, each on its side. They begin with objects
+//! below which the idle left hand is free.
 //!
 //! After each thing both hands return to their first poses. A hand stays where it is in the world while its
 //! robot rises from a walk, and is therefore lower on the next walk. Without the return, in the second
@@ -18,7 +18,7 @@ use crate::players::experts::skills::{
 use crate::scoring::{A, B};
 
 const WALK_M_S: f32 = 0.35;
-/// Speed at which a robot walks with something in its hand.
+/// Speed at which a robot walks with an object in its hand.
 const CARRY_M_S: f32 = 0.25;
 /// Lift of a held thing. While a robot walks, its pelvis and what it carries are up to 12 cm lower than at
 /// rest.

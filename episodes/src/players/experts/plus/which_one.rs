@@ -18,8 +18,8 @@ const CARRY_M_S: f32 = 0.25;
 /// Lift of the bottle. While B walks, its pelvis and the bottle are up to 12 cm lower than at rest. The
 /// bottle still has to clear the counter.
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.26);
-/// Step that B takes back from the shelf before it turns; nearer by, its left hand would sweep over the
-/// other bottles.
+/// Step that B takes back from the shelf before it turns. With a shorter step, its left hand would sweep over
+/// the other bottles.
 const BACK_M: Vector = Vector::new(0.0, -0.22, 0.0);
 /// Place where B turns, clear of the wall beside the hatch. `AT_HATCH_M` is where it then stands.
 const TURNING_M: Vector = Vector::new(1.02, -0.25, 0.0);

@@ -1,5 +1,5 @@
-//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to
-//! the partners. One robot that carries or pushes something with both hands is the smallest team.
+//! Robots that carry one object together, in step: all follow one path of the object, and hands yield to the
+//! partners. One robot that carries or pushes an object with both hands is the smallest team.
 
 use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
@@ -11,8 +11,8 @@ use super::walked_way::WalkedWay;
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
-/// Speed at which robots walk to their places before anything is held. Hands that reach out correct the
-/// rest.
+/// Speed at which robots walk to their places before they hold the object. Hands that reach out correct the
+/// remaining error.
 const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// Compliance of the hands, which two robots need to walk with a load.
@@ -77,14 +77,14 @@ impl<'a> CarryTeam<'a> {
         Ok(commander.facts()?.object(self.grasps[0].object).pose_in_world)
     }
 
-    /// Walks the robots to their places beside the object as it is now.
+    /// Walks the robots to their places beside the object, by its present pose.
     pub fn gather(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let walk_goals = self.walk_goals(commander)?;
         approach(commander, &walk_goals, NEAR)
     }
 
-    /// Walks the robots to their places beside the object as it is now; meanwhile their hands reach out to
-    /// their first stops.
+    /// Walks the robots to their places beside the object, by its present pose. Their hands reach out to
+    /// their first stops meanwhile.
     pub fn gather_reaching(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let walk_goals = self.walk_goals(commander)?;
         let mut reaches = Vec::with_capacity(walk_goals.len());
@@ -95,7 +95,7 @@ impl<'a> CarryTeam<'a> {
         walk_reaching(commander, &walk_goals, &reaches)
     }
 
-    /// Returns the walk goals that put the robots beside the object as it is now.
+    /// Returns the walk goals that put the robots beside the object in its present pose.
     fn walk_goals(&self, commander: &mut Commander) -> Result<Vec<WalkGoal>, PlayerError> {
         let object = upright(&self.object(commander)?);
         let way = |(robot, stand): (&usize, &Pose)| WalkGoal {
@@ -155,8 +155,8 @@ impl<'a> CarryTeam<'a> {
         Err(PlayerError::GaveUp("hands lost the load again and again".into()))
     }
 
-    /// Takes the held object through stops, world frame; `pace_m_s` is that of the robot that has farthest
-    /// to walk.
+    /// Carries the held object through stops in the world frame. `pace_m_s` is the pace of the robot with the
+    /// longest way.
     pub fn carry_by(
         &mut self,
         commander: &mut Commander,

@@ -33,14 +33,14 @@ pub struct RobotMove {
     pub wrists: WristTargets,
 }
 
-/// Motion of one hand. A part that is `None` stays as it is.
+/// Motion of one hand. A part that is `None` does not change.
 #[derive(Clone, Copy, Debug)]
 pub struct HandMove {
     pub robot: usize,
     pub side: Side,
-    /// Wrist pose in the world to arrive at.
+    /// Target pose of the wrist, world frame.
     pub world_from_wrist: Option<Pose>,
-    /// Finger angles to arrive at, rad, in the order of `move_wrists`.
+    /// Target finger angles, rad, in the order of `move_wrists`.
     pub fingers_rad: Option<[f32; 7]>,
 }
 
@@ -67,8 +67,8 @@ impl HandMove {
 #[derive(Clone, Copy)]
 struct HandTarget {
     world_from_wrist: Pose,
-    /// `None` until fingers are commanded: they stay as they are at the episode's start, be it around
-    /// something.
+    /// `None` until fingers are commanded. Until then they stay as at the episode's start, for example around
+    /// an object.
     fingers_rad: Option<[f32; 7]>,
 }
 

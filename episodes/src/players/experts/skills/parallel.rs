@@ -1,4 +1,4 @@
-//! Scripts that are played at the same time, each by robots of its own: their commands are merged into one.
+//! Scripts that are played at the same time. Each has its own robots, and their commands are merged into one.
 
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -9,9 +9,9 @@ use crate::scoring::Facts;
 
 const ACCELERATION_M_S2: f32 = 0.4;
 const AT_END_M: f32 = 1e-4;
-/// Least speed along a path.
+/// Minimum speed along a path.
 const CREEP_M_S: f32 = 0.02;
-/// Largest commanded speed of a robot's base, corrections included.
+/// Maximum commanded speed of a robot's base, corrections included.
 const MAX_SPEED_M_S: f32 = 0.35;
 
 /// Place of one robot and its hands, world frame.
@@ -22,7 +22,7 @@ pub struct Posture {
     pub wrists: Sides<Pose>,
 }
 
-/// Free distance of a path without obstacles: all of it.
+/// Free distance of a path without obstacles, which is its whole length.
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
 /// Postures by the distance gone.

@@ -5,24 +5,24 @@ use tandem_sim::{SplitMix64, Vector};
 
 /// Range of the relative change of a motion's duration at level 1.
 const PACE: [f32; 2] = [-0.08, 0.2];
-/// Largest relative reduction of the walking pace at level 1.
+/// Maximum relative reduction of the walking pace at level 1.
 const SLOWER: f32 = 0.12;
 /// Probability of a pause before a motion at level 1, and the range of its duration.
 const PAUSES: f32 = 0.12;
 const PAUSE_S: [f32; 2] = [0.1, 0.5];
-/// Largest detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
+/// Maximum detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
 /// absolute limit.
 const STRAY: f32 = 0.08;
 const MAX_STRAY_M: f32 = 0.02;
 /// Probability at level 1 that a free hand misses after a long way, and the range of the error.
 const MISSES: f32 = 0.12;
 const MISS_M: [f32; 2] = [0.01, 0.03];
-/// Least length of a long way: no object that is to be grasped is as near.
+/// Minimum length of a long way. Every object to be grasped is farther away.
 const LONG_WAY_M: f32 = 0.12;
 /// Time that a hand which has missed needs to come back.
 pub const COME_BACK_S: f32 = 0.5;
 
-/// Constant that separates this random stream from the one with which the same seed places things.
+/// Constant that separates this random stream from the one with which the same seed places objects.
 const STREAM: u64 = 0x7661_7269_6574_7931;
 
 /// Random source of a demonstration's variation.
@@ -36,7 +36,7 @@ pub struct Variety {
 }
 
 impl Variety {
-    /// Creates the variety of a level; `None` for level 0, at which nothing is drawn.
+    /// Creates the variety of a level; `None` for level 0, which has no variety.
     pub fn new(level: u8, seed: u32) -> Option<Variety> {
         if level == 0 {
             return None;
@@ -47,7 +47,7 @@ impl Variety {
         Some(variety)
     }
 
-    /// Returns the variety of one of several scripts that are played at once. Each has its own stream, so
+    /// Returns the variety of one of several scripts that are played at once. Each has a separate stream, so
     /// the order of draws between scripts does not matter.
     pub fn of_script(&self, script: usize) -> Variety {
         let mut own = self.clone();

@@ -1,4 +1,4 @@
-//! Places on the floor with headings, and walking to them, several robots at once.
+//! Places on the floor with headings, and walks of several robots at once to such places.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -15,7 +15,8 @@ const CLOSE: Tolerance = Tolerance { off_m: 0.02, off_rad: 0.04 };
 /// Tolerance within which a standing robot does not have to walk again.
 const AT_REST: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.04 };
 const TRIES: u32 = 3;
-/// Longest time of a walk. A robot that has not come to rest by then is close enough, or never will be.
+/// Maximum time of a walk. A robot that has not come to rest by then is close enough, or would never come to
+/// rest.
 const LONGEST_S: f32 = 20.0;
 /// Number of commands for feet to come together and swaying to stop.
 const SETTLE_COMMANDS: u32 = 6;
@@ -25,7 +26,7 @@ const TWO_STEPS_COMMANDS: usize = 6;
 const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 /// Time that hands take to reach out.
 const REACH_S: f32 = 1.5;
-/// Longest time of a walk with hands that reach out; they correct the rest.
+/// Maximum time of a walk with hands that reach out. The hands correct the remaining error.
 const LONGEST_REACHING_S: f32 = 4.0;
 
 /// Goal of a robot's walk.
@@ -52,7 +53,7 @@ pub struct TargetVelocity {
     pub turning_rad_s: f32,
 }
 
-/// Returns the base velocity with which a robot whose pelvis is at `at` comes to a place and stays with it.
+/// Returns the base velocity with which a robot whose pelvis is at `at` reaches a place and stays there.
 pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> BaseVelocity {
     let mut off_m = to.translation - at.translation;
     off_m.z = 0.0;
@@ -66,8 +67,8 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
     }
 }
 
-/// Brings robots near their places, without waiting for them to come to rest. Their hands stay as they are
-/// relative to the body. A robot that has come near stops while the others still walk.
+/// Brings robots near their places, without waiting for them to come to rest. Their hands keep their poses
+/// relative to the body. A robot that has arrived stops while the others still walk.
 pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
@@ -90,7 +91,7 @@ pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance
     Ok(())
 }
 
-/// Brings robots to their places, with hands as they are relative to the body. The others hold still.
+/// Brings robots to their places. Their hands keep their poses relative to the body. The others hold still.
 pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {

@@ -14,7 +14,7 @@ const MIN_LATERAL: f32 = 0.7;
 const MIN_ASIDE_M: f32 = 0.01;
 /// Distance from the middle up to which a link is a head.
 const MAX_HEAD_ASIDE_M: f32 = 0.05;
-/// Joints of an arm at most.
+/// Maximum number of joints of an arm.
 const MAX_ARM: usize = 7;
 /// Parts of names of joints that move fingers.
 const FINGERS: [&str; 3] = ["finger", "thumb", "grip"];

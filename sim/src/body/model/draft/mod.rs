@@ -24,11 +24,11 @@ pub struct RobotDraft {
     pub notes: Vec<String>,
 }
 
-/// Cosine from which a hand is along an axis of the root.
+/// Minimum cosine at which a hand counts as along an axis of the root.
 const ALONG_COSINE: f32 = 0.9;
-/// Length of a forearm from which it shows the direction of the hand.
+/// Minimum length of a forearm that shows the direction of the hand.
 const MIN_FOREARM_M: f32 = 0.05;
-/// Vertical part of a hand's direction from which it hangs.
+/// Minimum vertical part of a hanging hand's direction.
 const MIN_UPRIGHT: f32 = 0.7;
 /// Height of the camera below the top of a trunk, and of a head as a share of its height.
 const BELOW_TOP_M: f32 = 0.06;

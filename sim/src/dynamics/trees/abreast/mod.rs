@@ -18,7 +18,7 @@ const SIDE: usize = 4;
 #[repr(align(32))]
 pub struct Abreast(pub [f64; ABREAST]);
 
-/// Rows of one degree of freedom side by side: their non-zero columns, and Y in them.
+/// Rows of one degree of freedom side by side: their non-zero columns, and the entries of Y there.
 pub struct AbreastRow<'a> {
     pub column: &'a [u16],
     pub y: &'a [Abreast],
@@ -33,8 +33,8 @@ impl Abreast {
         Abreast(from_fn(|lane| of(self.0[lane], other.0[lane])))
     }
 
-    /// Returns a mask that stays in a vector: all bits set in lanes where the condition holds, none
-    /// elsewhere.
+    /// Returns a mask that stays in a vector: in each lane all bits are set if the condition holds, and
+    /// otherwise no bit.
     #[inline(always)]
     pub fn mask(self, other: Abreast, is: impl Fn(f64, f64) -> bool) -> Abreast {
         self.with(other, |a, b| f64::from_bits(if is(a, b) { u64::MAX } else { 0 }))

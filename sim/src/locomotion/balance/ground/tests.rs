@@ -58,8 +58,8 @@ fn pressure_stays_under_the_feet() {
     }
 }
 
-/// A moment that would tip the feet costs horizontal force, and only as much as brings the pressure back
-/// under them.
+/// A moment that would tip the feet reduces the horizontal force, and only by the amount that brings the
+/// pressure back under the feet.
 #[test]
 fn tipping_moments_cost_horizontal_force() {
     let pressure_m = Vector::new(0.3, 0.0, 0.0);

@@ -16,11 +16,12 @@ use crate::locomotion::BaseCommand;
 
 const BEGINS_1_S: f32 = 1.0;
 const ENDS_1_S: f32 = 5.0;
-/// Pelvis height below which a command means bending down to something.
+/// Pelvis height below which a command means bending down to an object.
 const LOWEST_M: f32 = 0.70;
 /// Time after the last command until arms and fingers have come to rest.
 const STILL_S: f32 = 0.5;
-/// Force (N) from which on a moving hand has met something, and (`LEFT_N`) down to which this remains so.
+/// Force (N) above which a moving hand has met an obstacle, and (`LEFT_N`) below which it no longer touches
+/// one.
 const MET_N: f32 = 8.0;
 const LEFT_N: f32 = 6.0;
 
@@ -31,7 +32,7 @@ pub(in crate::locomotion::balance) struct Ahead {
     free: bool,
     /// Time since arms and fingers were last commanded to move.
     still_s: f32,
-    /// True if a hand has met something by its own motion.
+    /// True if a hand has met an obstacle by its own motion.
     met: bool,
 }
 

@@ -25,8 +25,8 @@ use crate::plane::flat;
 const BEGINS_1_S: f32 = 2.0;
 /// Rate at which a hold ends: fingers that slip on an edge press again within a moment.
 const ENDS_1_S: f32 = 1.0;
-/// Pull (38 N on a G1) and its duration from which on it is the world's, and the share of that pull down
-/// to which it remains so.
+/// Minimum pull on the hands (38 N on a G1) that counts as the world's. It has to last for `STRONG_S`, and
+/// counts until it falls below the share `STILL_STRONG` of the minimum.
 const STRONG_M_S2: f32 = 1.1;
 const STRONG_S: f32 = 0.1;
 const STILL_STRONG: f32 = 0.5;
@@ -36,13 +36,14 @@ const GIVES_WAY_1_S: f32 = 1.0;
 /// slower than the observer.
 const EXPLAINED_SHARE: f32 = 1.3;
 const EXPLAINED_M_S2: f32 = 0.2;
-/// Unexplained push that counts as an error of the estimate while something is held: 17 N on a G1.
+/// Minimum unexplained push that counts as an error of the estimate while the hands hold an object: 17 N on a
+/// G1.
 const UNEXPLAINED_M_S2: f32 = 0.5;
 
 /// Estimate of how far a robot yields; see the module's text.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct Partner {
-    /// Degree to which fingers press on something, 0 to 1.
+    /// Degree to which fingers press on an object, 0 to 1.
     hold_share: f32,
     /// Time for which the pull has been strong.
     strong_s: f32,
@@ -87,8 +88,8 @@ impl Partner {
     }
 }
 
-/// Returns the part of a push that comes through the hands: along the felt force, and not much more than
-/// that.
+/// Returns the part of a push that comes through the hands. It has the direction of the felt force and is not
+/// much larger.
 fn explained_m_s2(push_m_s2: Vector, felt_m_s2: Vector) -> Vector {
     let along = felt_m_s2.normalize_or_zero();
     let most_m_s2 = felt_m_s2.length() * EXPLAINED_SHARE + EXPLAINED_M_S2;
@@ -103,7 +104,7 @@ mod tests {
 
     const DT_S: f32 = 1.0 / 200.0;
 
-    /// Splits a push ahead for some seconds, of which hands feel `felt_m_s2`.
+    /// Splits a push ahead that lasts for some seconds. The hands feel the part `felt_m_s2`.
     fn split(
         partner: &mut Partner,
         presses: bool,

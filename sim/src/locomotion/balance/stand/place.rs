@@ -9,8 +9,8 @@ use crate::body::{BodyEstimate, BodyScale};
 use crate::locomotion::BaseVelocity;
 use crate::plane::flat;
 
-/// Distances for a robot that was pushed out of its stance and steps back to it. Beyond the leash it
-/// does not come back; within the second distance it is back.
+/// Maximum distance at which a robot that was pushed out of its stance steps back to its place. Within
+/// `BACK_M` it counts as back.
 const LEASH_M: f32 = 1.0;
 const BACK_M: f32 = 0.04;
 const RETURN_1_S: f32 = 1.0;
@@ -32,7 +32,7 @@ const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
 /// Maximum shift of the pelvis that compensates the position error of the feet after such a stop.
 const MOVED_SHIFT_M: f32 = 0.04;
-/// The same for a robot that holds something with partners.
+/// This maximum for a robot that holds an object with partners.
 const HELD_SHIFT_M: f32 = 0.02;
 
 /// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.

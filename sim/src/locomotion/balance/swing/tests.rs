@@ -105,7 +105,7 @@ fn the_foot_moves_as_its_joints_say() {
     }
 }
 
-/// On its path a foot is only accelerated along it; off it, it is pulled back.
+/// A foot on its path is only accelerated along the path. A foot off its path is pulled back.
 #[test]
 fn a_foot_off_its_path_is_pulled_back() {
     let body = Posed::standing().body();

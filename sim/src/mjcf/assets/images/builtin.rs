@@ -66,7 +66,7 @@ pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
     };
     let (width, height) = (side("width"), side("height"));
     match texture.attribute("type") {
-        // One texel says all of a plain colour.
+        // One texel is enough for a plain colour.
         Some("2d") if builtin.is_plain() => vec![builtin.flat_image(1, 1)],
         Some("2d") => vec![builtin.flat_image(width, height)],
         // Plain gradients need few texels: the sky is blended between them.
@@ -159,7 +159,7 @@ fn across(pixel: u32, pixels: u32) -> f64 {
     2.0 * f64::from(pixel) / f64::from(pixels.saturating_sub(1).max(1)) - 1.0
 }
 
-/// Returns a number from 0 to 1 that looks random: which texels are marked is not what MuJoCo draws.
+/// Returns a number from 0 to 1 that looks random. The marked texels therefore differ from MuJoCo's.
 fn scattered(number: u32) -> f64 {
     let mixed = u64::from(number).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);

@@ -37,7 +37,7 @@ impl KtxImages {
     ///
     /// # Errors
     ///
-    /// Returns an error that says what would be read if the file is of another kind or damaged.
+    /// Returns an error that lists the supported kinds, for a file of another kind or a damaged one.
     pub fn decode(bytes: &[u8]) -> Result<Option<KtxImages>, Box<dyn Error + Send + Sync>> {
         if !bytes.starts_with(&MAGIC) {
             return Ok(None);

@@ -1,5 +1,5 @@
-//! Copies of the content of `<replicate>`, written out as MuJoCo makes them: each in a frame of its own, with
-//! its number behind all names. Contacts, equalities and actuators that name something in it are copied, too.
+//! Copies of the content of `<replicate>`, written out like MuJoCo's. Each has its own frame, and its number
+//! is appended to all names. Contacts, equalities and actuators that name something inside are copied, too.
 
 #[cfg(test)]
 mod tests;
@@ -19,9 +19,9 @@ use crate::user_file::MAX_TEXT_BYTES;
 
 /// Maximum `count`.
 const MAX_COPIES: usize = 100_000;
-/// Sections whose elements are copied with what they name.
+/// Sections whose elements are copied if they name a copied element.
 const SECTIONS: [&str; 3] = ["contact", "equality", "actuator"];
-/// Attributes of these elements that name others, by the kind of what they name.
+/// Attributes of these elements that name others, by the kind of the named element.
 const REFERENCES: [(&str, &[&str]); 4] = [
     ("body", &["body", "body1", "body2"]),
     ("joint", &["joint", "joint1", "joint2", "jointinparent"]),
@@ -49,7 +49,7 @@ struct CopiedElement {
 #[derive(Clone)]
 struct CopiedName {
     end: usize,
-    /// Indices of the replicates around what it names, the outermost first.
+    /// Indices of the replicates around the element that it names, the outermost first.
     around: Vec<usize>,
     suffix: String,
 }
@@ -69,7 +69,7 @@ enum TextChange {
 struct CopyPlan<'a, 'i> {
     source: &'a MjcfText,
     root: Node<'a, 'i>,
-    /// In the order of their ends, so that those inside another are before it.
+    /// The ends of attributes are in this order, so that an inner one is before the outer one.
     replicates: Vec<Replicate<'a, 'i>>,
     /// Indices of the replicates, by the numbers of their elements.
     numbers: BTreeMap<usize, usize>,
@@ -209,7 +209,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         root.into_iter().flat_map(|root| root.children()).filter(move |node| node.has_tag_name(tag))
     }
 
-    /// Copies the elements of a section that name something in a replicate.
+    /// Copies the elements of a section that name an element of a replicate.
     fn copy_elements(&mut self, section: &'static str) -> Result<(), SimError> {
         let nodes = self.section(section).flat_map(|section| section.children()).filter(Node::is_element);
         let (mut found, mut removed) = (Vec::new(), Vec::new());
@@ -227,7 +227,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         Ok(())
     }
 
-    /// Returns an element of a section; `None` if it names nothing in a replicate.
+    /// Returns an element of a section; `None` if it names no element of a replicate.
     fn element(&self, node: &Node, section: &str) -> Result<Option<CopiedElement>, SimError> {
         let mut names = Vec::new();
         for (kind, attributes) in REFERENCES {
@@ -257,7 +257,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         Ok(Some(CopiedElement { range: node.range(), names }))
     }
 
-    /// Replaces elements that name something in a replicate by their copies, behind all others.
+    /// Replaces elements that name an element of a replicate by their copies, behind all others.
     fn copied(
         &self,
         elements: Vec<CopiedElement>,
@@ -389,7 +389,7 @@ fn kind(node: &Node) -> Option<&'static str> {
     }
 }
 
-/// Returns text as it stands in an attribute.
+/// Returns text in the escaped form of an attribute.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;").replace('\'', "&apos;")
 }

@@ -1,10 +1,10 @@
-// Baked light. `Face` says where that of a triangle is in `baked`.
+// Baked light. `Face` contains the place of a triangle's light in `baked`.
 
 const ON_MAP = 1u;
 const ON_CUBE = 2u;
 const ON_PART = 3u;
 
-// Light on a surface with a normal; the cube's first side has this number.
+// Light on a surface with a normal. `first` is the number of the cube's first side.
 fn cube_light(first: u32, normal: vec3f) -> vec4f {
     let side = select(vec3u(0u), vec3u(1u), normal < vec3f(0.0));
     let squared = normal * normal;
@@ -38,7 +38,7 @@ fn baked_light(part_number: u32, face: Face, point_m: vec3f, normal: vec3f) -> v
     }
 }
 
-// As `sunlit`, of a wide lamp in the sun's direction.
+// Like `sunlit`, for a wide lamp in the sun's direction.
 fn lamplit(point_m: vec3f, normal: vec3f) -> f32 {
     let place = on_sun_map(point_m + normal * view.extra.x);
     let share = on_map_share(place);
@@ -53,7 +53,7 @@ fn lamplit(point_m: vec3f, normal: vec3f) -> f32 {
     return 1.0 - sums.x / (1.0 + ratio * ratio) * share;
 }
 
-// Linear colour of a surface in baked light, which things shadow.
+// Linear colour of a surface in baked light, with the shadows of objects.
 fn lit_by_baked(light: vec4f, base: vec3f, point_m: vec3f, normal: vec3f, eye_direction: vec3f) -> vec3f {
     let facing_sun = max(dot(normal, view.to_sun.xyz), 0.0);
     var open = 1.0;

@@ -1,4 +1,4 @@
-// Light of a file's lamps, as `shading/lamps.rs` has it, and the sky.
+// Light of a file's lamps, like in `shading/lamps.rs`, and the sky.
 
 fn power(value: f32, exponent: f32) -> f32 {
     return pow(max(value, 1e-12), exponent);
@@ -47,7 +47,7 @@ fn in_cone(lamp: Lamp, layer: i32, point_m: vec3f, normal: vec3f) -> f32 {
     return sum / 9.0;
 }
 
-// The values that files have for linear light.
+// Values of sRGB, in which files store colours, for linear light.
 fn encoded(linear: vec3f) -> vec3f {
     let curve = 1.055 * pow(max(linear, vec3f(1e-12)), vec3f(1.0 / 2.4)) - 0.055;
     return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
@@ -55,10 +55,10 @@ fn encoded(linear: vec3f) -> vec3f {
 
 // Surface in the light of lamps; linear colours.
 struct LampSurface {
-    // That of `gloss_at`.
+    // Result of `gloss_at`.
     gloss: vec4f,
     base: vec3f,
-    // Colour of its image alone, or 1.
+    // Colour of its image alone; 1 without an image.
     image: vec3f,
     emitted: vec3f,
     ambient_share: f32,
@@ -112,7 +112,7 @@ fn lit_by_lamps(surface: LampSurface, point_m: vec3f, normal: vec3f, to_eye: vec
             own_lit += lamp.diffuse.xyz * (share * facing);
             own_glossy = lamp.specular.xyz * (share * gloss.y * shine);
         }
-        // The light of each lamp with shadows is limited by itself.
+        // The light of each lamp with shadows is limited separately.
         if layer >= 0 {
             shown += min(own * own_lit + own_glossy * tint, most);
         } else {
@@ -124,7 +124,7 @@ fn lit_by_lamps(surface: LampSurface, point_m: vec3f, normal: vec3f, to_eye: vec
     return decoded(min(seen, vec3f(1.0)));
 }
 
-// Colour where no surface is.
+// Colour of pixels without a surface.
 fn sky_at(ray: vec3f) -> vec3f {
     if view.counts.z == 0u {
         return SKY;

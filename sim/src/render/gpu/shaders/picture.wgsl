@@ -1,4 +1,4 @@
-// The constants that both renderers share stand before this text.
+// The constants that both renderers share are inserted before this text.
 
 struct View {
     // Rows from directions of the world to the camera's frame.
@@ -6,27 +6,27 @@ struct View {
     up: vec4f,
     back: vec4f,
     eye_m: vec4f,
-    // Rays of the world, 1 m deep: through the picture's top left corner, and from a sample to the next.
+    // Rays in the world to a depth of 1 m: through the picture's top left corner, and from a sample to the next.
     corner_ray: vec4f,
     right_ray: vec4f,
     down_ray: vec4f,
-    // Column, row and nearness on the shadow's map: scalar product with a point of the world, and a number more.
+    // Column, row and nearness on the shadow's map: scalar product with a point of the world, plus a constant.
     sun_column: vec4f,
     sun_row: vec4f,
     sun_nearness: vec4f,
-    // Twice the focal length by width and by height; width and height in pixels.
+    // Twice the focal length, divided by width and by height; width and height in pixels.
     scale: vec4f,
-    // Of the map of contacts: world coordinates of its corner, and texels per metre.
+    // World coordinates of the corner of the map of contacts, and its texels per metre.
     contact: vec4f,
-    // What lights the scenery, as `Light` in `shading/mod.rs` has it.
+    // Light of the scenery, like `Light` in `shading/mod.rs`.
     sun: vec4f,
     to_sun: vec4f,
     from_below: vec4f,
     from_above: vec4f,
-    // Number of lamps, number of layers of blended surfaces, where the sky's head is in `texels` or 0, and the lamp
+    // Number of lamps, number of layers of blended surfaces, place of the sky's head in `texels` or 0, and the lamp
     // that casts a shadow, if it is not the sun.
     counts: vec4u,
-    // Offset along the normal of the sun's shadows, and whether lamps, or baked light, light the scenery.
+    // Offset of the sun's shadows along the normal; 1 if lamps light the scenery; 1 if baked light does.
     extra: vec4f,
     head_ambient: vec4f,
     head_diffuse: vec4f,
@@ -34,17 +34,17 @@ struct View {
     lamps: array<Lamp, MAX_LIGHTS>,
 }
 
-// A light of the scene's file in the world, as `FileLight` has it.
+// A light of the scene's file in the world, like `FileLight`.
 struct Lamp {
-    // With 0 for a directional light, 1 for a spot, 2 for a point.
+    // Fourth number: 0 for a directional light, 1 for a spot, 2 for a point.
     position: vec4f,
-    // With the cosine of the cutoff.
+    // Fourth number: cosine of the cutoff.
     direction: vec4f,
-    // With the exponent.
+    // Fourth number: exponent.
     ambient: vec4f,
-    // With the layer of its shadow, or -1.
+    // Fourth number: layer of its shadow, or -1.
     diffuse: vec4f,
-    // With the width of a texel of its map at 1 m.
+    // Fourth number: width of a texel of its map at 1 m.
     specular: vec4f,
     attenuation: vec4f,
     // Map of its shadows.
@@ -63,19 +63,19 @@ struct Part {
     second_rgb: vec4f,
     // Emission, specular strength, shininess and alpha.
     gloss: vec4f,
-    // Id; bits: it casts a shadow, is blended, is cut out by its image's alpha, its image has alpha; whether things
-    // stand on it; and where its image's head is in `texels`, 0 without an image.
+    // Id; bits: it casts a shadow, is blended, is cut out by its image's alpha, its image has alpha; whether objects
+    // stand on it; and the place of its image's head in `texels`, 0 without an image.
     flags: vec4u,
-    // Where the heads of the numbers for gloss and for normals are in `texels`, 0 without; bits of the roughness, -1
+    // Places of the heads of the numbers for gloss and for normals in `texels`, 0 without; bits of the roughness, -1
     // without, and of the metallic share.
     maps: vec4u,
-    // Where the head of the image for emitted light is in `texels`, 0 without; bits of the factor on it.
+    // Place of the head of the image for emitted light in `texels`, 0 without; bits of the factor on it.
     emitted: vec4u,
 }
 
 struct Face {
     normal: vec4f,
-    // Columns: how the normal changes with the point, per metre.
+    // Columns: change of the normal with the point, per metre.
     bend_x: vec4f,
     bend_y: vec4f,
     bend_z: vec4f,
@@ -90,10 +90,10 @@ struct Face {
 @group(0) @binding(1) var<storage, read> corners: array<vec4u>;
 @group(0) @binding(2) var<storage, read> faces: array<Face>;
 @group(0) @binding(3) var<storage, read> parts: array<Part>;
-// Heights of what carries things, and how dark it is there.
+// Heights of supports of objects, and their darkness at contacts.
 @group(0) @binding(4) var<storage, read> contacts: array<vec2f>;
 
-// Of each triangle, for images: gradients of its three coordinates in its mesh's frame, with their values at the
+// Gradients of each triangle's three coordinates for images in its mesh's frame, with their values at the
 // first corner.
 struct Coordinates {
     u: vec4f,
@@ -101,12 +101,12 @@ struct Coordinates {
     w: vec4f,
 }
 @group(0) @binding(5) var<storage, read> coordinates: array<Coordinates>;
-// Of each image: width, height, number of levels, and 0, or on a cube its number of images, 1 or 6 (+x, -x, +y, -y,
+// Numbers of each image: width, height, number of levels, and 0, or on a cube its number of images, 1 or 6 (+x, -x, +y, -y,
 // +z, -z); then the levels, the largest first.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
 
 // Baked light: the cubes of all parts, those of the room, and the texels of its maps; irradiance, and the share of it
-// that things shadow.
+// that objects shadow.
 @group(0) @binding(7) var<storage, read> baked: array<vec4f>;
 
 // One layer for the sun, or for each lamp.
@@ -176,7 +176,7 @@ fn see_veils(@builtin(vertex_index) vertex: u32) -> Seen {
     return seen_if(vertex, 2u);
 }
 
-// A corner, if its part is solid or blended.
+// Corner of a triangle whose part is solid or blended.
 fn seen_if(vertex: u32, blended: u32) -> Seen {
     let part = parts[corners[vertex].w];
     if (part.flags.y & 2u) != blended {
@@ -211,7 +211,7 @@ fn mark_next(seen: Seen) -> @location(0) u32 {
     return seen.triangle;
 }
 
-// Of where a ray, 1 m deep, meets the plane of a triangle: 1 / depth.
+// 1 / depth of the point at which a ray to a depth of 1 m meets the plane of a triangle.
 fn nearness_1_m(triangle: u32, ray: vec3f) -> f32 {
     let part = part_of(triangle);
     let corner = corner_m(3u * triangle);
@@ -221,7 +221,7 @@ fn nearness_1_m(triangle: u32, ray: vec3f) -> f32 {
     return dot(across, ray) / dot(across, in_world(part, corner) - view.eye_m.xyz);
 }
 
-// Linear colour of what a ray sees, and its alpha.
+// Linear colour of the surface that a ray meets, and its alpha.
 fn colour(triangle: u32, ray: vec3f) -> vec4f {
     let part = part_of(triangle);
     let face = faces[triangle];
@@ -286,7 +286,7 @@ fn ray_at(sample: vec2u) -> vec3f {
     return view.corner_ray.xyz + view.right_ray.xyz * middle.x + view.down_ray.xyz * middle.y;
 }
 
-// Whether neighbouring samples show different things at different depths.
+// True if neighbouring samples show different objects at different depths.
 fn differ(a: u32, a_at: vec2u, b_at: vec2u) -> bool {
     let b = textureLoad(samples, b_at, 0).x;
     if a == b || a == NOTHING || b == NOTHING || part_of(a).flags.x == part_of(b).flags.x {
@@ -297,7 +297,7 @@ fn differ(a: u32, a_at: vec2u, b_at: vec2u) -> bool {
     return abs(near_a - near_b) > OUTLINE_DEPTH_STEP * max(near_a, near_b);
 }
 
-// How many of the neighbours to the right and below are outlined against a sample.
+// Number of neighbours to the right and below that are outlined against a sample.
 fn outlines(triangle: u32, at: vec2u, size: vec2u) -> f32 {
     if any(at + 1u >= size) {
         return 0.0;
@@ -365,7 +365,7 @@ fn blended(pixel: vec2u, behind: vec3f) -> vec3f {
     return sum;
 }
 
-// The triangle that depth and id of a pixel are those of.
+// Triangle from which a pixel has its depth and id.
 fn measured(pixel: vec2u, ray: vec3f) -> u32 {
     for (var layer = 0; layer < i32(view.counts.y); layer++) {
         let triangle = textureLoad(veil_centres, pixel, layer, 0).x;

@@ -1,4 +1,4 @@
-// Shadows of the sun, and contacts of things.
+// Shadows of the sun, and contacts of objects.
 
 // 1 in the sun, 0 in the shadow: a bilinear filter three texels wide.
 fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
@@ -13,8 +13,8 @@ fn on_map(place: vec3f, layer: i32) -> f32 {
     return 1.0 - blocked(place, layer).x * share;
 }
 
-// Of what blocks the sun from a place on a map of shadows: its share in a bilinear filter three texels wide, and
-// the sum of its heights above the place, each times its share.
+// Surfaces that block the sun from a place on a map of shadows: their share in a bilinear filter three texels
+// wide, and the sum of their heights above the place, each times its share.
 fn blocked(place: vec3f, layer: i32) -> vec2f {
     let texel = place.xy - 0.5;
     let low = floor(texel);
@@ -43,7 +43,7 @@ fn on_map_share(place: vec3f) -> f32 {
     return min(min(border.x, border.y) / FADE_TEXELS, 1.0);
 }
 
-// How dark contacts make a point of what carries things.
+// Darkness at contacts for a point of a support.
 fn darkness(point_m: vec3f) -> f32 {
     let place = (point_m.xy - view.contact.xy) * view.contact.z - 0.5;
     if any(place < vec2f(0.0)) || any(place >= vec2f(f32(CONTACT_TEXELS - 1u))) {

@@ -1,11 +1,11 @@
 // Surfaces without light: patterns, and images with their layers.
 
-// Up and down between 0 and 1 with a period of 1.
+// Triangle wave between 0 and 1 with a period of 1.
 fn wave(x: f32) -> f32 {
     return abs(2.0 * fract(x) - 1.0);
 }
 
-// How much of the second colour there is at a point.
+// Share of the second colour at a point.
 fn second_share(part: Part, point_m: vec3f) -> f32 {
     if part.rgb.w == 0.0 {
         return 0.0;
@@ -172,7 +172,7 @@ fn image_at(part: Part, place: ImagePlace) -> vec4f {
     return vec4f(rgba.xyz, select(1.0, rgba.w, (part.flags.y & 8u) != 0u));
 }
 
-// How a surface shines: emission, specular strength, shininess and the metallic share. The second and third of
+// Gloss of a surface: emission, specular strength, shininess and the metallic share. The second and third of
 // `numbers` are roughness and metallic share.
 fn gloss_at(part: Part, numbers: vec3f) -> vec4f {
     var gloss = vec4f(part.gloss.xyz, bitcast<f32>(part.maps.w));

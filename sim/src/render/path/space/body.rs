@@ -16,7 +16,7 @@ use crate::render::{Part, Scenery};
 /// Sides of triangles that a ray can meet.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum MetSides {
-    /// The front, as for a rasteriser: a camera inside of its robot's head sees out of it.
+    /// The front is as for a rasteriser: a camera inside of its robot's head sees through the head.
     Front,
     Both,
 }
@@ -99,7 +99,8 @@ impl Body {
                 corner_uv.push(vertices.map(|vertex| vertex.uv));
             }
         }
-        // By arrays, because the two libraries may use different versions of one for vectors.
+        // Vectors are passed as arrays, because the two libraries may use different versions of a vector's
+        // type.
         let triangle = |corners_m: &[Vec3A; 3]| {
             let [v0, v1, v2] = corners_m.map(|corner_m| corner_m.to_array().into());
             Triangle { v0, v1, v2 }

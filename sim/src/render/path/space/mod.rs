@@ -87,7 +87,7 @@ impl<'a> Space<'a> {
         nearest.map(|nearest| (nearest.hit.reach_m, nearest))
     }
 
-    /// Returns true if something is between a point and another `reach_m` away.
+    /// Returns true if there is a surface between a point and another `reach_m` away.
     #[inline]
     pub fn is_blocked(&self, origin_m: Vector, direction: Vector, reach_m: f32) -> bool {
         let (origin_m, direction) = (origin_m.into(), direction.into());
@@ -112,7 +112,7 @@ impl<'a> Space<'a> {
         };
         let face_normal = face_normal * -1f32.copysign(face_normal.dot(ray.direction));
         let normal = normal * 1f32.copysign(normal.dot(face_normal));
-        // SeenSurface from inside, a curved surface is on the other side of its triangle.
+        // Seen from inside, a curved surface is on the other side of its triangle.
         let outside = (curved_m - point_m).dot(face_normal) > 0.0;
         let start_m = if outside { curved_m } else { point_m } + face_normal * OFF_M;
         Spot {

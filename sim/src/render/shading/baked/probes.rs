@@ -50,7 +50,7 @@ impl Probes {
         })
     }
 
-    /// Fills in probes without light from those beside them.
+    /// Sets the light of the probes. A probe without light gets the mean of its neighbours.
     pub fn set(&mut self, mut cubes: Vec<Option<LightCube>>) {
         let [columns, rows, _] = self.counts;
         let steps = [1, columns, columns * rows];

@@ -1,4 +1,4 @@
-//! Disturbances of a team that holds something and is commanded to stand.
+//! Disturbances of a team that holds an object and is commanded to stand.
 
 use std::f32::consts::PI;
 
@@ -13,9 +13,9 @@ use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
 pub(super) enum ArmDisturbance {
     None,
     /// Offset of both shoulders' pitch of every robot, reached within a second, rad. With negative values,
-    /// hands press towards the load in front of them.
+    /// hands press towards the load ahead.
     Shoulders(f32),
-    /// The same, with the opposite sign for every second robot: all hands move the load in one direction.
+    /// This offset with the opposite sign for every second robot: all hands move the load in one direction.
     OneWay(f32),
     /// Normal noise of this deviation (rad) on arms and waist, drawn anew five times a second.
     Noise(f32),

@@ -25,8 +25,8 @@ pub(in crate::teams) struct SharedLoad {
     hold: &'static Hold,
     /// True if hands reach out while their robots walk to the object, for example to the legs of a table.
     reaching: bool,
-    /// Height of the pelvis over the floor while the object is taken, and while it is held; `None` leaves
-    /// it as it is.
+    /// Height of the pelvis over the floor while the object is taken, and while it is held; `None` does not
+    /// change it.
     pelvis_m: Option<[f32; 2]>,
     lift_m: f32,
     /// Displacement of the object when it is carried: x and y in the world frame.
@@ -113,7 +113,7 @@ impl SharedLoad {
         self.holders.iter().map(|(robot, ..)| *robot)
     }
 
-    /// Takes the object and lifts it; if `carried`, walks a short way with it.
+    /// Takes the object and lifts it. With `carried`, the robots then walk a short way with the object.
     pub(in crate::teams) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
         self.with_team(episode, |commander, team| {
             if !carried {

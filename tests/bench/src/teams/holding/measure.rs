@@ -9,9 +9,9 @@ use tandem_sim::{CONTROL_HZ, Step, Vector};
 pub(super) struct HoldResult {
     /// Largest horizontal distance of a pelvis from its place at the command to stand, or to set down.
     pub drift_m: f32,
-    /// The same, from its place [`RESTS_AFTER_S`] later.
+    /// The same distance, from its place [`RESTS_AFTER_S`] after the command.
     pub late_drift_m: f32,
-    /// The same for the point at which the object is held, averaged over each second.
+    /// The same distance of the point at which the object is held, averaged over each second.
     pub load_drift_m: f32,
     /// Time at which the last robot stood for good.
     pub standing_after_s: f32,
@@ -32,8 +32,8 @@ pub(super) struct HoldMeasure<'a> {
     steps: u32,
     began_m: Vec<Vector>,
     rested_m: Vec<Vector>,
-    /// Middle of the wrists at the command to stand, in the object's frame. Points below it would also
-    /// measure a table's swing.
+    /// Midpoint of the wrists at the command to stand, in the object's frame. A point further below would
+    /// also measure the swing of a table.
     held_in_object_m: Vector,
     load_m: VecDeque<Vector>,
     load_rested_m: Option<Vector>,

@@ -1,8 +1,8 @@
-//! Teams that hold something between them and are commanded to stand: cases of the bench of base
-//! controllers that need hands.
+//! Teams that hold an object together and are commanded to stand: cases of the bench of base controllers that
+//! need hands.
 //!
-//! They take an object as the experts do, lift it and, in some cases, walk a short way with it. Then all
-//! bases are commanded to stand and all arms to stay as they are, except for the case's disturbance.
+//! They take an object like the experts do, lift it and, in some cases, walk a short way with it. Then all
+//! bases are commanded to stand and all arms to keep their posture, except for the case's disturbance.
 
 mod disturbance;
 pub(super) mod loads;
@@ -49,8 +49,8 @@ struct Setup {
 const HOLDS_S: f32 = 6.0;
 const LOWERING_S: f32 = 1.0;
 
-/// Returns the setups, and the cases of each: the end of its name, and the disturbance. One episode of a
-/// team up to the command serves all of them.
+/// Returns the setups, and the cases of each: the end of the case's name, and its disturbance. All cases of a
+/// setup continue from the same episode up to the command.
 fn setups() -> Vec<(Setup, Vec<(&'static str, ArmDisturbance)>)> {
     use ArmDisturbance::{LastOpens, Noise, None as Undisturbed, OneWay, Shoulders};
     let mut setups = Vec::new();

@@ -21,7 +21,8 @@ pub struct EpisodeRow {
     pub seed: u32,
     pub protocol: Protocol,
     pub assistance: Assistance,
-    /// Number of the phase at which it began; `task` for the task's beginning, `moment` for another moment.
+    /// Number of the phase at which the episode began; `task` for the task's beginning, `moment` for another
+    /// moment.
     pub start: String,
     /// False if it is in no rate, because the policy itself or the simulator failed.
     pub counted: bool,

@@ -28,9 +28,9 @@ const STYLE: &str = "text { fill: #1d2024; font: 13.5px Helvetica, Arial, sans-s
 const MARGIN_PX: f64 = 16.0;
 const TITLE_PX: f64 = 26.0;
 const LEGEND_LINE_PX: f64 = 20.0;
-/// Largest number of drawings beside each other.
+/// Maximum number of drawings beside each other.
 const MAX_COLUMNS: usize = 3;
-/// Width of a letter of the legend, at most.
+/// Maximum width of a letter in the legend.
 const LETTER_PX: f64 = 8.5;
 /// Width of the mark before a line of the legend.
 const MARK_PX: f64 = 36.0;
@@ -59,8 +59,8 @@ pub fn rates_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     file(drawings, legend.chain([bar]).chain(colours(policies)).collect())
 }
 
-/// Returns the file with the curves of the times at which phases were reached, by task. Tasks of which no
-/// phase was reached are named in the legend.
+/// Returns the file with the curves of the times at which phases were reached, by task. The legend names the
+/// tasks in which no phase was reached.
 pub fn times_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     let phases = policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.phases.len()).max();
     let line = |number: usize| LegendLine {

@@ -83,7 +83,7 @@ fn heading(phase: &PhaseReport, y_px: f64) -> String {
 /// Returns the known rates of a phase, each with its mark and its description.
 fn lanes(policy: &str, phase: &PhaseReport) -> Vec<(Mark, String, Rate)> {
     let rates = [phase.cumulative, phase.conditional, phase.from_its_beginning];
-    // The first phase has no phase before it.
+    // The first phase has no predecessor.
     let said = |kind: usize| kind != 1 || phase.conditional != phase.cumulative || phase.number != "p1";
     let lanes = MARKS.iter().zip(rates).enumerate().filter(|(kind, _)| said(*kind));
     lanes

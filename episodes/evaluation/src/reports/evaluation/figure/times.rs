@@ -17,12 +17,12 @@ const HEIGHT_PX: f64 = 206.0;
 
 /// Number of kinds of lines; more phases share them.
 pub const LINES: usize = 4;
-/// Largest number of intervals on the axis of times.
+/// Maximum number of intervals on the axis of times.
 const MAX_INTERVALS: f64 = 6.0;
 /// Steps between the marks of that axis, in seconds.
 const STEPS_S: [f64; 11] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
-/// Draws the curves of one task; `None` if no episode has reached a phase of it.
+/// Draws the curves of one task; `None` if no episode has reached any of its phases.
 pub fn figure(task: &str, policies: &[PolicyReport]) -> Option<Figure> {
     let of_task = |policy: &PolicyReport| policy.tasks.iter().position(|of| of.task == task);
     let played = policies.iter().enumerate().filter_map(|(index, policy)| {

@@ -81,7 +81,7 @@ fn played(episodes: usize, tasks: &[&str]) -> String {
     }
 }
 
-/// Draws every task of which there is a drawing.
+/// Draws every task for which `draw` returns a figure.
 fn cards(report: &EvaluationReport, draw: fn(&str, &[PolicyReport]) -> Option<Figure>) -> String {
     let drawings = report.tasks().into_iter().filter_map(|task| draw(task, &report.policies));
     drawings.map(|drawing| drawing.card()).collect()

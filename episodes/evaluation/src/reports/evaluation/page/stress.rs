@@ -69,7 +69,7 @@ fn card(report: &StressReport) -> String {
     )
 }
 
-/// Renders a bar from 0 to the rate, fainter for lower levels, with the interval on it.
+/// Renders a bar from 0 to the rate, with its interval. Bars of lower levels are fainter.
 fn bar(row: &StressRow, y_px: f64) -> String {
     let label = format!(
         "{}, level {}: {} %, {}{}",

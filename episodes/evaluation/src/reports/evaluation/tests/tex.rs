@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Returns the report of policies whose names and notes have everything that LaTeX reads as commands.
+/// Returns the report of policies whose names and notes contain all characters that LaTeX reads as commands.
 fn report() -> String {
     let mut episodes = nine_six_three(r"[a] #1_{x} 50% & $\begin{x} ~^|<>");
     for (index, name) in ["*π 代", "--b", "`c`\n\nd"].into_iter().enumerate() {
@@ -41,7 +41,7 @@ fn every_environment_ends_where_it_should() {
     assert!(open.is_empty() && text.matches("\\begin{tabular}").count() > 8, "{open:?}: {text}");
 }
 
-/// Every row has a cell for each column, and nothing in it is a command that is not ours.
+/// Every row has a cell for each column, and contains no commands but ours.
 #[test]
 fn rows_have_the_columns_of_their_tables() {
     let text = report();

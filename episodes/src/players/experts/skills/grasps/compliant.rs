@@ -9,11 +9,12 @@ use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
-/// Time that hands take to their first stop, to the next, and from the last to where they close.
+/// Durations of the hands' motions: to their first stop, to the next stop, and from the last stop to the
+/// place where they close.
 const TO_FIRST_STOP_S: f32 = 0.9;
 const BETWEEN_STOPS_S: f32 = 0.6;
 const FROM_LAST_STOP_S: f32 = 0.5;
-/// Time to come to rest before hands close: the goals then make up for the wrists' remaining error.
+/// Time for hands to come to rest before they close. The goals then compensate the wrists' remaining error.
 const SETTLE_S: f32 = 0.2;
 /// Time that hands take to leave, all stops together.
 const LEAVE_S: f32 = 1.2;
@@ -24,7 +25,7 @@ const CLOSING_GIVES: usize = 6;
 /// Stiffness against which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
 const STIFFNESS_N_M: f32 = 300.0;
 const MAX_GIVE_M: f32 = 0.01;
-/// Largest distance of a wrist's goal from the wrist.
+/// Maximum distance of a wrist's goal from the wrist.
 const LEASH_M: f32 = 0.03;
 
 /// Closes all hands on their places at once. All grasps have the same hold. Hands that miss try again while
@@ -105,8 +106,8 @@ fn stops(grasps: &[HandGrasp]) -> usize {
     grasps.first().map_or(0, |grasp| grasp.hold.stops_m.len())
 }
 
-/// Opens hands where they are, because opening fingers push; then the hands leave by the stops that they
-/// came by. Hands that still touch go in and out once more, and give way to what they are caught on.
+/// Opens hands in place, because opening fingers push. The hands then leave by the stops by which they came.
+/// Hands that still touch an object repeat this once, and yield to the obstacle.
 pub fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     open_in_place(commander, grasps)?;
     for stop in (0..stops(grasps)).rev() {

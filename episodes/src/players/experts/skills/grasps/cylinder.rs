@@ -27,8 +27,8 @@ pub struct CylinderGrasp<'a> {
 }
 
 impl CylinderGrasp<'_> {
-    /// Returns the wrist motion to the grip of the object, if that were upright and raised by `raise_m`.
-    /// The hand stays `standoff_m` short of it.
+    /// Returns the wrist motion to the grip of the object, as if the object were upright and raised by
+    /// `raise_m`. The hand stops `standoff_m` before the grip.
     fn grip(
         &self,
         commander: &mut Commander,
@@ -72,7 +72,7 @@ impl CylinderGrasp<'_> {
         back_off(commander, self.robot, self.side, Vector::new(0.0, STANDOFF_M, 0.0))
     }
 
-    /// Returns the motion back towards the robot, clear of what others do with the object.
+    /// Returns the motion back towards the robot, which leaves room for the others' motions with the object.
     pub fn out_of_the_way(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         back_off(commander, self.robot, self.side, OUT_OF_THE_WAY_M)
     }
@@ -82,12 +82,12 @@ impl CylinderGrasp<'_> {
         self.bring(commander, Pose::from_translation(object_m))
     }
 
-    /// Returns the wrist motion that brings the held object to a pose (world); its turn about its own axis
-    /// does not matter.
+    /// Returns the wrist motion that brings the held object to a pose (world). The object's rotation about
+    /// its own axis is free.
     pub fn bring(&self, commander: &mut Commander, world_from_object: Pose) -> Result<HandMove, PlayerError> {
         let object = commander.facts()?.object(self.object).pose_in_world;
         let wrist = commander.world_from_wrist(self.robot, self.side)?;
-        // The object's turn about its axis relative to the hand stays as it was grasped.
+        // The object keeps the rotation about its axis that it had relative to the hand in the grasp.
         let upright = self.upright_rotation(object, wrist);
         let goal = Pose::from_parts(world_from_object.translation, world_from_object.rotation * upright);
         Ok(self.reach(goal * object.inverse() * wrist))
@@ -126,7 +126,7 @@ pub fn pick_up_all(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Resul
     Err(PlayerError::GaveUp(format!("could not grasp {}", names.join(" and "))))
 }
 
-/// Makes one attempt: over the objects, down beside them, around them, close.
+/// Makes one attempt: the hands move over the objects, down beside them, around them, and close.
 fn grasp_once(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
     let each = |commander: &mut Commander,
                 part: fn(&CylinderGrasp, &mut Commander) -> Result<HandMove, PlayerError>| {

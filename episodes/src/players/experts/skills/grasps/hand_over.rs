@@ -11,7 +11,7 @@ const ABOVE_PLACE_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
 const RELEASES: usize = 20;
 
-/// Takes an object that stands on something, and lifts it straight up until it is held in the air.
+/// Takes an object that stands on a support, and lifts it straight up until it is held in the air.
 pub fn pick_up(commander: &mut Commander, grasp: &CylinderGrasp, lift_m: Vector) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         pick_up_all(commander, &[*grasp])?;
@@ -50,7 +50,8 @@ pub fn hand_over(
     Err(PlayerError::GaveUp(format!("{robot} could not take the {}", taker.object.replace('_', " "))))
 }
 
-/// Opens the hand and takes it away until it holds nothing. A person who controls the hand may take longer.
+/// Opens the hand and withdraws it until it no longer holds the object. A person who controls the hand may
+/// take longer.
 fn let_go(commander: &mut Commander, giver: &CylinderGrasp) -> Result<(), PlayerError> {
     for _ in 0..RELEASES {
         release(commander, giver)?;

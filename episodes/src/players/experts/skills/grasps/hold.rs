@@ -10,7 +10,7 @@ use super::cylinder::{OPEN_RAD, wrapped_rad};
 /// Hold of a place on an object by a right hand.
 #[derive(Clone, Copy)]
 pub struct Hold {
-    /// Rotation of the wrist against the robot's heading: about z, then about its own y, then about its own
+    /// Rotation of the wrist against the robot's heading: about z, then about the wrist's y, then about its
     /// x.
     pub turned_rad: [f32; 3],
     /// Position of the place in the wrist's frame while the hand holds it.
@@ -32,7 +32,7 @@ impl Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.105, 0.042, 0.0),
         open_rad: OPEN_RAD,
-        // Closed farther than round a bottle: a bar is thinner, and the thumb has to oppose the fingers.
+        // Closed farther than around a bottle: a bar is thinner, and the thumb has to oppose the fingers.
         closed_rad: wrapped_rad(1.3),
         stops_m: &[Vector::new(0.0, 0.08, 0.0)],
         behind_m: 0.29,
@@ -44,8 +44,8 @@ impl Hold {
     pub const EDGE: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.085, 0.047, 0.0),
-        // The thumb's last joint is commanded to its stop, and the middle one beyond what the plate allows:
-        // that presses.
+        // The thumb's last joint is commanded to its stop, and the middle one beyond the range that the plate
+        // allows, which makes it press.
         open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
         closed_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
         stops_m: &[Vector::new(0.14, 0.03, 0.0), Vector::new(0.0, 0.03, 0.0)],
@@ -65,7 +65,7 @@ impl Hold {
         open_rad: OPEN_RAD,
         closed_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
         stops_m: &[Vector::new(0.0, 0.09, 0.025), Vector::new(0.0, 0.0, 0.025)],
-        // Any nearer, the thighs of robots that sway as they walk press on the legs.
+        // At a smaller distance, the thighs of robots that sway while they walk press on the legs.
         behind_m: 0.38,
     };
 
