@@ -104,7 +104,11 @@ impl Geom {
         let geom = &document.model.bodies[body].body.geoms[index];
         let refuse = |what: &str| document.source.refuse_at(document.checked.bodies[body].geoms[index], what);
         let (body_from_geom, half_length_m) = match geom.fromto {
-            Some(ends) => between(ends),
+            // The parser applies the frames around a geom to its pose, but not to its ends.
+            Some(ends) => {
+                let (frame_from_geom, half_length_m) = between(ends);
+                (pose(&geom.pose) * frame_from_geom, half_length_m)
+            }
             None => (pose(&geom.pose), vector(geom.size).y),
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));

@@ -141,7 +141,7 @@ impl Document {
 fn set_pose(geom: &mut Geom, ends_m: [f64; 6]) {
     let (body_from_geom, half_length_m) = between(ends_m);
     let Pose { rotation, translation, .. } = body_from_geom;
-    geom.pose = DPose3::from_parts(translation.as_dvec3(), rotation.as_dquat());
+    geom.pose *= DPose3::from_parts(translation.as_dvec3(), rotation.as_dquat());
     let (radius_m, half_length_m) = (geom.size[0], f64::from(half_length_m));
     geom.size = match geom.type_ {
         GeomType::Box | GeomType::Ellipsoid => [radius_m, radius_m, half_length_m],

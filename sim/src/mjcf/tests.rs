@@ -1,6 +1,7 @@
 //! Trees, equalities and actuators of small files, and refusals.
 
 use rapier3d::glamx::{DPose3, DQuat, DVec3};
+use rapier3d::math::Vector;
 
 use super::{
     Actuator, ActuatorKind, AxisJoint, BodyTree, Document, EqualityConstraint, EqualityKind, LinkJoint,
@@ -80,6 +81,20 @@ fn masses_come_from_all_geoms_of_a_link() {
     for (have, expected) in have.into_iter().zip(expected) {
         assert!((have - expected).abs() < 1e-4 * expected, "{have} instead of {expected}");
     }
+}
+
+#[test]
+fn frames_move_geoms_between_two_ends() {
+    let geoms = r#"<frame pos="1 0 0" euler="0 1.5707963 0"><geom type="capsule" size="0.1" fromto="0 0 1 0 0 3"/></frame>
+        <replicate count="2" offset="0 5 0"><geom type="capsule" size="0.1" fromto="0 0 1 0 0 3"/></replicate>"#;
+    let trees = trees(&format!("<worldbody><body><freejoint/>{geoms}</body></worldbody>"));
+    let middles_m = [[3.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 5.0, 2.0]].map(Vector::from);
+    let body = trees.iter().find(|tree| !tree.links[0].geoms.is_empty()).expect("the body");
+    for (geom, middle_m) in body.links[0].geoms.iter().zip(middles_m) {
+        assert!((geom.body_from_geom.translation - middle_m).length() < 1e-6, "{:?}", geom.body_from_geom);
+    }
+    assert_eq!(body.links[0].geoms.len(), middles_m.len());
+    assert!((body.links[0].geoms[0].body_from_geom.rotation * Vector::Z - Vector::X).length() < 1e-6);
 }
 
 #[test]

@@ -215,9 +215,9 @@ mod tests {
         let mut check = |report: CaseReport| {
             played += 1;
             assert_eq!(report.survived, report.seeds, "{report}");
-            assert!(report.final_drift_m.is_some_and(|drift_m| drift_m <= off_m), "{report}");
-            assert!(report.heading_error_deg.is_some_and(|off_deg| off_deg <= 1.5), "{report}");
-            assert!(report.load_drift_m.is_none_or(|drift_m| drift_m <= squeezed_m), "{report}");
+            assert!(report.figures.final_drift_m.is_some_and(|drift_m| drift_m <= off_m), "{report}");
+            assert!(report.figures.heading_error_deg.is_some_and(|off_deg| off_deg <= 1.5), "{report}");
+            assert!(report.figures.load_drift_m.is_none_or(|drift_m| drift_m <= squeezed_m), "{report}");
         };
         let (robot, controller) = (RobotFile::default(), Controller::default());
         run(&robot, &controller, Sensing::default(), filter, &(3000..=3002), &mut check).unwrap();

@@ -244,9 +244,9 @@ mod tests {
             played += 1;
             assert_eq!(report.survived, report.seeds, "{report}");
             let most = |value: Option<f32>| value.expect("measured in every case");
-            assert!(most(report.sway_m) <= MAX_SWAY_M, "{report}");
-            assert!(most(report.load_drift_m) <= MAX_LOAD_DRIFT_M, "{report}");
-            assert!(most(report.standing_after_s) <= MAX_STANDING_AFTER_S, "{report}");
+            assert!(most(report.figures.sway_m) <= MAX_SWAY_M, "{report}");
+            assert!(most(report.figures.load_drift_m) <= MAX_LOAD_DRIFT_M, "{report}");
+            assert!(most(report.figures.standing_after_s) <= MAX_STANDING_AFTER_S, "{report}");
         };
         let (robot, controller) = (RobotFile::default(), Controller::default());
         run(&robot, &controller, Sensing::default(), filter, &(3000..=3002), &mut check).unwrap();
