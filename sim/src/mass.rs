@@ -1,7 +1,7 @@
 //! Mass properties of bodies from inertia matrices, densities and sums.
 //!
-//! Parry's eigenvectors of an inertia matrix are wrong if its entries differ by less than about 1e-5: a pencil
-//! would have the inertia of its long axis about another one. Masses are therefore multiplied by a power of two,
+//! Parry's eigenvectors of an inertia matrix are wrong if its entries differ by less than about 1e-5: the long
+//! axis of a pencil would have the inertia of another one. Masses are therefore multiplied by a power of two,
 //! which rounds nothing, until their inertia is about 1000 kg m^2.
 
 use rapier3d::math::{Matrix, Vector};
@@ -92,7 +92,8 @@ mod tests {
         let hull = SharedShape::convex_hull(&corners).expect("a hull");
         let mut of_hull = at_unit_density(|density| hull.mass_properties(density));
         of_hull.set_mass(mass_kg, true);
-        assert!(deviation(of_hull, expected) < 1e-5, "{of_hull:?}");
+        // Parry sums up a hull in single precision.
+        assert!(deviation(of_hull, expected) < 1e-3, "{of_hull:?}");
 
         let half = SharedShape::cuboid(half_m.x, 0.5 * half_m.y, half_m.z).mass_properties(density_kg_m3);
         let placed = |y_m: f32| half.transform_by(&Pose::from_translation(Vector::new(0.0, y_m, 0.0)));

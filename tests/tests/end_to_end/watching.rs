@@ -17,6 +17,8 @@ use crate::policies::plans::{plan, play};
 const TOKEN: &str = "correct-horse-battery-staple";
 /// Handover in a kitchen with images on its surfaces.
 const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen/handover.xml");
+/// Boxes on a floor, all of one colour each.
+const BOXES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/scenes/stack.xml");
 
 /// Returns calls of 0.1 s each that move both robots.
 fn calls() -> Vec<(&'static str, Value)> {
@@ -443,7 +445,7 @@ fn images_on_surfaces_are_sent_once() {
 
 #[test]
 fn a_room_without_images_sends_none() {
-    let server = TestServer::start();
+    let server = TestServer::with(Layer { scene: Some(BOXES.into()), ..Layer::default() });
     let id = server.episode("benchmark");
     let (head, _) = scene(&get(&server, &format!("/watch/scene?episode={id}")).1);
     assert_eq!((&head["textures"], &head["sky"], &head["lights"]), (&json!([]), &Value::Null, &Value::Null));

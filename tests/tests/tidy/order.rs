@@ -13,7 +13,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "plane", "random", "srgb", "dynamics", "owner", "user_file"],
+            &["units", "sides", "plane", "random", "srgb", "mass", "dynamics", "owner", "user_file"],
             &["error"],
             &["assets"],
             &["mjcf"],

@@ -7,7 +7,6 @@ use super::scene::Coat;
 use super::sequence::{PixelSeed, SampleCount};
 use super::view::PathView;
 use super::*;
-use crate::mjcf::Gloss;
 use crate::render::made::{bottle, cuboid, world};
 use crate::render::shading::SKY;
 use crate::render::{Cameras, Light, cpu};
@@ -117,7 +116,7 @@ fn a_red_wall_colours_the_floor_beside_it() {
 
 /// Returns some rows of an image of many paths through random points of each pixel, unfiltered.
 fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> {
-    let (width, coat) = (camera.width as usize, Coat::of(&Gloss::default()));
+    let width = camera.width as usize;
     let mut rgb = vec![0; camera.height as usize / REFERENCE_ROWS * width * 3];
     for_each_row(&mut rgb, width * 3, 2, |number, bytes| {
         let row = number * REFERENCE_ROWS;
@@ -130,6 +129,7 @@ fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> 
                     continue;
                 };
                 let ray = (spot.point_m - view.eye_m()).normalize();
+                let coat = Coat::of(&view.scene.gloss_and_emitted_rgb(&spot, 0.0).0);
                 let seed = PixelSeed::of([column as u32 + 512 * sample, row as u32 + 64]);
                 let [direct, indirect, coated] =
                     view.scene.lit_layers(&spot, coat, ray, seed, SampleCount(1));
