@@ -56,6 +56,9 @@ use text::settings::FileSettings;
 use text::source::{self, MjcfText};
 use text::split::{Split, split};
 
+/// Excess of a joint position over its range from which a note names the joint.
+const MIN_EXCESS_RAD_OR_M: f64 = 0.01;
+
 /// Files are equal if they have the same name and content.
 impl PartialEq for Document {
     fn eq(&self, other: &Document) -> bool {
@@ -206,7 +209,7 @@ impl Document {
     }
 
     /// Notes ball joints, and free joints with springs, damping, friction or armature of their own or of a
-    /// class. Also notes `<general>` actuators without effect.
+    /// class. Also notes joints that begin beyond their ranges, and `<general>` actuators without effect.
     fn note_joints(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
         let mut joints = bodies.flat_map(|(entry, bytes)| entry.body.joints.iter().zip(&bytes.joints));
@@ -222,8 +225,32 @@ impl Document {
         let told = notes
             .into_iter()
             .filter_map(|(byte, what)| Some(format!("`{}`: joint: {what}", self.source.line(byte?))));
-        let told: Vec<String> = told.chain(idle).collect();
+        let told: Vec<String> = told.chain(self.beyond_range()).chain(idle).collect();
         self.checked.approximated.extend(told);
+    }
+
+    /// Returns a note on the joints that begin beyond their ranges, and the first of them.
+    fn beyond_range(&self) -> Option<String> {
+        let bodies = self.checked.bodies.iter().enumerate();
+        let mut beyond = bodies.filter_map(|(body, bytes)| {
+            let joint = self.joint(body).ok()?;
+            let [low, high] = joint.axis()?.range?;
+            let excess = low.max(-high);
+            (excess > MIN_EXCESS_RAD_OR_M).then_some((*bytes.joints.first()?, excess, joint))
+        });
+        let (byte, excess, joint) = beyond.next()?;
+        let amount = match joint {
+            LinkJoint::Slide(_) => format!("{excess:.3} m"),
+            _ => format!("{:.0} degrees", excess.to_degrees()),
+        };
+        let others = match beyond.count() {
+            0 => String::new(),
+            count => format!(" (and {count} more joints do)"),
+        };
+        let place = self.source.line(byte);
+        Some(format!(
+            "`{place}`: joint: it begins {amount} beyond its range{others} and is pushed back at another speed than by MuJoCo's soft limits"
+        ))
     }
 
     /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.

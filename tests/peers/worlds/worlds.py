@@ -11,7 +11,8 @@ that MuJoCo reads by itself: directly and, if it is refused, after `tandem impor
 docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
 without commands. It is called chaotic if MuJoCo itself differs as much with half the time step, and forced if it begins with
 a joint beyond its range or with bodies that overlap: soft limits and contacts then throw bodies as far as their stiffness
-decides. The build folder is CARGO_TARGET_DIR, if that is set.
+decides. Other motion is "noted" if notes at load, or the report of the import, name what of the file is approximated or left
+out. The build folder is CARGO_TARGET_DIR, if that is set.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ import tempfile
 import threading
 import zipfile
 from collections import Counter
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
@@ -43,8 +45,8 @@ BEYOND_DEG = 1.0
 OVERLAP_M = 0.005
 LIMIT_S = 300.0
 #: Outcomes of a file that is read: motion as in MuJoCo; other motion, but so has MuJoCo at another time step; other motion from
-#: a start beyond limits; other motion.
-READ = ("same", "chaotic", "forced", "other")
+#: a start beyond limits; other motion of a file whose notes say what is approximated; other motion.
+READ = ("same", "chaotic", "forced", "noted", "other")
 KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf", ".glb", ".gltf", ".ply"}
 
 
@@ -186,16 +188,21 @@ def is_chaotic(source: Path, expected: dict[str, Any]) -> bool:
     return any(far_m > NEAR_M or far_deg > NEAR_DEG for far_m, far_deg in (apart(a, b) for a, b in pairs))
 
 
-def outcome(settle: str, path: Path, source: Path, expected: dict[str, Any]) -> tuple[str, str]:
+def outcome(
+    settle: str, path: Path, source: Path, expected: dict[str, Any], dropped: Sequence[str] = ()
+) -> tuple[str, str]:
     found, error = run([settle, str(path)])
     if found is None:
         kind = "slow" if "takes more than" in error else "diverged" if "diverged" in error else "refused"
         return kind, error.replace("\n", " | ")[:400]
     word, far_m, far_deg, off = compared(found, expected)
+    notes = [*dropped, *found["notes"]]
     if word == "other":
-        word = "chaotic" if is_chaotic(source, expected) else "forced" if expected["is_forced"] else "other"
+        other = "noted" if notes else "other"
+        word = "chaotic" if is_chaotic(source, expected) else "forced" if expected["is_forced"] else other
     seconds = found["loaded_s"] + found["drawn_s"]
-    return word, f"{1000 * far_m:.0f} mm {far_deg:.0f} deg, mass off by {100 * off:.1f} %, {seconds:.2f} s"
+    measured = f"{1000 * far_m:.0f} mm {far_deg:.0f} deg, mass off by {100 * off:.1f} %, {seconds:.2f} s"
+    return word, "; ".join([measured, *(notes if word != "same" else [])]).replace("\n", " ").replace("\t", " ")
 
 
 def is_model(path: Path) -> bool:
@@ -228,7 +235,9 @@ def tried(folder: Path, settle: str, path: Path) -> list[str]:
         with tempfile.TemporaryDirectory() as out:
             written, error = myself("import", str(path), out)
             refused = ("refused", error[-300:].replace("\n", " "))
-            after = refused if written is None else outcome(settle, Path(out) / "scene.xml", path, expected)
+            after = refused
+            if written is not None:
+                after = outcome(settle, Path(out) / "scene.xml", path, expected, written["dropped"])
     package = path.relative_to(folder / "files").parts[0]
     return [package, str(path.relative_to(folder / "files" / package)), *native, *after]
 
@@ -242,8 +251,8 @@ def show(tsv: Path) -> None:
         row["files"] += 1
         row[native if native in READ else f"imported {after}"] += 1
     total = sum(counts.values(), Counter())
-    print("| package | files | read, as in MuJoCo | imported, as in MuJoCo | chaotic | forced | otherwise | neither |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| package | files | read, as in MuJoCo | imported, as in MuJoCo | chaotic | forced | otherwise, noted | otherwise | neither |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for name, row in [*sorted(counts.items()), ("all", total)]:
         same = [row["same"], row["imported same"]]
         cells = [*same, *(row[word] + row[f"imported {word}"] for word in READ[1:])]

@@ -305,9 +305,12 @@ fn what_is_approximated_is_named_once() {
     let geoms = r#"<geom size="1" solref="0.01 1"/><geom size="1" solref="0.02 1" margin="1"/>"#;
     let ball = r#"<body><joint type="ball"/><geom size="1"/></body>"#;
     let free = r#"<body><joint type="free" damping="1"/><geom size="1"/></body>"#;
-    let document = document(&format!("<worldbody>{geoms}{ball}{free}</worldbody>"));
+    let knee = r#"<body><joint range="0.6 2"/><geom size="1"/></body>"#;
+    let within = r#"<body><joint range="0.6 2" ref="0.6"/><geom size="1"/></body>"#;
+    let document = document(&format!("<worldbody>{geoms}{ball}{free}{within}{knee}{knee}</worldbody>"));
     let told = document.approximations().join("\n");
-    assert_eq!(document.approximations().len(), 4, "{told}");
+    assert_eq!(document.approximations().len(), 5, "{told}");
+    assert!(told.contains("joint: it begins 34 degrees beyond its range (and 1 more joints do)"), "{told}");
     assert!(told.contains("joint: a ball is three hinges"), "{told}");
     assert!(told.contains("joint: nothing holds or slows a free body"), "{told}");
     assert!(told.contains("`test.xml:1`: geom in <worldbody> has solref: every contact"), "{told}");
@@ -337,8 +340,6 @@ fn classes_are_those_of_the_file() {
         let error = with(defaults, "");
         assert!(error.contains(expected), "{error}");
     }
-    let late = r#"<default><geom euler="0 0 1"/></default><compiler angle="degree"/>"#;
-    assert!(refusal(late).contains("a <default> before it has angles; put it first"));
 }
 
 #[test]

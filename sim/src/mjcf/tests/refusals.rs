@@ -33,6 +33,8 @@ fn what_is_refused_says_what_would_work() {
     check(format!("{}{welded}", body(hinge)), "unknown body `b`; have: a");
     let driven = r#"<actuator><motor joint="i"/></actuator>"#;
     check(format!("{}{driven}", body(hinge)), "no hinge or slide `i`; have: h");
+    let late = r#"<default><geom euler="0 0 1"/></default><compiler angle="degree"/>"#;
+    check(late.into(), "a <default> before it has angles; put it first");
 }
 
 #[test]
