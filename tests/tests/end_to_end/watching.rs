@@ -17,8 +17,12 @@ use crate::policies::plans::{plan, play};
 const TOKEN: &str = "correct-horse-battery-staple";
 /// Handover in a kitchen with images on its surfaces.
 const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen/handover.xml");
-/// Boxes on a floor, all of one colour each.
-const BOXES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/scenes/stack.xml");
+/// Handover on a block of one colour.
+const BLOCK: &str = r#"<mujoco model="block"><worldbody>
+  <geom type="plane" size="3 3 0.1" rgba="0.5 0.5 0.5 1"/>
+  <geom type="box" pos="0.37 0 0.78" size="0.2 0.5 0.02" rgba="0.7 0.6 0.5 1"/>
+  <site name="task"/>
+</worldbody></mujoco>"#;
 
 /// Returns calls of 0.1 s each that move both robots.
 fn calls() -> Vec<(&'static str, Value)> {
@@ -445,7 +449,10 @@ fn images_on_surfaces_are_sent_once() {
 
 #[test]
 fn a_room_without_images_sends_none() {
-    let server = TestServer::with(Layer { scene: Some(BOXES.into()), ..Layer::default() });
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("block.xml");
+    std::fs::write(&path, BLOCK).expect("a file");
+    let server = TestServer::with(Layer { scene: Some(path), ..Layer::default() });
     let id = server.episode("benchmark");
     let (head, _) = scene(&get(&server, &format!("/watch/scene?episode={id}")).1);
     assert_eq!((&head["textures"], &head["sky"], &head["lights"]), (&json!([]), &Value::Null, &Value::Null));
