@@ -86,6 +86,7 @@ pub use robot::{
     StateSource,
 };
 pub use sides::{Side, Sides};
+pub use srgb::linear_light;
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use user_file::{MAX_TEXT_BYTES, read_bytes, read_text, with_own_separators};
 pub use world::{

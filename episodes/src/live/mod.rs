@@ -19,6 +19,7 @@ use crate::observation::Picture;
 use crate::recording::{NoteMessage, ToolCallMessage, ToolCallRecord, TranscriptEntry};
 
 pub use scene::LiveScene;
+pub(crate) use textures::SceneTextures;
 pub use textures::{ImageFile, LiveTexture};
 
 /// Receiver of a session's events.

@@ -28,7 +28,7 @@ pub struct ImageFile {
 
 /// Distinct images of a scene.
 #[derive(Default)]
-pub(super) struct SceneTextures {
+pub(crate) struct SceneTextures {
     pub found: Vec<Arc<LiveTexture>>,
     /// Numbers in `found`, by addresses. Equal images at several addresses share a number.
     numbers: HashMap<*const Texture, usize>,

@@ -1,5 +1,6 @@
 //! Replays of recordings: simulated again and compared step by step, or rendered again by any camera.
 
+mod export;
 mod look_back;
 mod phase_trace;
 mod pictures;
@@ -7,6 +8,7 @@ mod scene;
 mod verify;
 mod video;
 
+pub use export::{ExportError, ExportFormat, export};
 pub use look_back::RecordedEpisode;
 pub use phase_trace::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};

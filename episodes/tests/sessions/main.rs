@@ -5,6 +5,7 @@ mod cameras;
 mod checkpoints;
 mod commands;
 mod common;
+mod exports;
 mod felt;
 mod files;
 mod films;

@@ -1,4 +1,4 @@
-//! `tandem replay`: recordings simulated again, filmed, or rendered with depth.
+//! `tandem replay`: recordings simulated again, filmed, exported, or rendered with depth.
 
 mod phases;
 
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::replay::{
     Difference, DrawnPictures, EpisodeCamera, FilmPlan, PictureSize, PicturesPlan, Verdict, Verification,
-    draw_all, film, verify,
+    draw_all, export, film, verify,
 };
 use tandem_episodes::{
     CameraModel, Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session, printable,
@@ -19,7 +19,7 @@ use tandem_tools_spec::ResultReply;
 use super::CommandResult;
 use crate::settings::one_of;
 
-/// Replay recordings: describe, verify or film them, or render the images and depth of every camera.
+/// Replay recordings: describe, verify, film or export them, or render the images and depth of every camera.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArgs {
     /// Recordings, for example runs/handover-seed0/episode.mcap, or their folders, or the
@@ -44,7 +44,11 @@ pub struct ReplayArgs {
     /// interrupted run is continued.
     #[arg(long, value_name = "DIR")]
     render: Option<PathBuf>,
-    /// Images per second of simulated time.
+    /// Moving geometry of one recording for other renderers: FILE.glb (glTF, for example for Blender), or
+    /// FILE.usda (USD, for example for Isaac Sim) with a folder of its images beside it.
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
+    /// Images or moments per second of simulated time.
     #[arg(long, value_name = "HZ", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=50))]
     rate: u32,
     /// Duration of the video in seconds, for example 4 for a film that plays faster than a long episode
@@ -96,6 +100,9 @@ pub fn run(args: ReplayArgs) -> CommandResult {
     if args.video.is_some() && args.recordings.len() > 1 {
         return Err("--video films one recording; give one".into());
     }
+    if args.export.is_some() && args.recordings.len() > 1 {
+        return Err("--export writes one recording; give one".into());
+    }
     let mut all_same = true;
     for path in &args.recordings {
         if path.extension().is_some_and(|extension| extension == "checkpoint") {
@@ -119,6 +126,10 @@ pub fn run(args: ReplayArgs) -> CommandResult {
                 args.seconds.map_or_else(|| format!("{} a second", args.rate), |s| format!("in {s} s"));
             println!("  {}: {pictures} pictures, {pace}", video.display());
         }
+        if let Some(file) = &args.export {
+            let moments = export(&recording, args.rate, file)?;
+            println!("  {}: {moments} moments, {} a second", file.display(), args.rate);
+        }
         if let Some(folder) = &args.render {
             let plan = PicturesPlan {
                 rate_hz: args.rate,
@@ -138,7 +149,7 @@ pub fn run(args: ReplayArgs) -> CommandResult {
 /// Reports the step in which the simulator failed. With `--verify`, repeats that step and returns true if
 /// it fails in the same way.
 fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::error::Error>> {
-    if args.video.is_some() || args.render.is_some() {
+    if args.video.is_some() || args.render.is_some() || args.export.is_some() {
         return Err(format!(
             "{} holds one step, without pictures; give the recording beside it",
             path.display()
@@ -276,6 +287,7 @@ mod tests {
             video: None,
             camera: "third_person".into(),
             render: None,
+            export: None,
             rate: 25,
             seconds: None,
             size: None,

@@ -83,6 +83,17 @@ pub enum Carrier {
     Object(usize),
 }
 
+impl Carrier {
+    /// Returns the pose of the carrier after `step`, which must be a step of its world.
+    pub fn world_from_carrier(self, step: &Step) -> Pose {
+        match self {
+            Carrier::Room => Pose::IDENTITY,
+            Carrier::Link { robot, link } => step.robots[robot].truth.world_from_link[link],
+            Carrier::Object(object) => step.objects[object].state.world_from_object,
+        }
+    }
+}
+
 /// Poses of all parts of a scenery after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedScenery {
@@ -171,20 +182,15 @@ impl Scenery {
 
     /// Returns the poses of all parts after `step`, which must be a step of this scenery's world.
     pub fn place(&self, step: &Step) -> PlacedScenery {
-        let world_from_carrier = |carrier: Carrier| match carrier {
-            Carrier::Room => Pose::IDENTITY,
-            Carrier::Link { robot, link } => step.robots[robot].truth.world_from_link[link],
-            Carrier::Object(object) => step.objects[object].state.world_from_object,
-        };
         let mut middle_m = Vector::ZERO;
         for robot in &step.robots {
             middle_m += robot.truth.world_from_pelvis().translation / step.robots.len() as f32;
         }
         let world_from_mesh =
-            self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);
+            self.parts.iter().map(|part| part.carrier.world_from_carrier(step) * part.carrier_from_mesh);
         let lamps = self.lamps.iter().flat_map(|lamps| &lamps.lamps);
         PlacedScenery {
-            lights: lamps.map(|lamp| lamp.light.moved(&world_from_carrier(lamp.carrier))).collect(),
+            lights: lamps.map(|lamp| lamp.light.moved(&lamp.carrier.world_from_carrier(step))).collect(),
             world_from_mesh: world_from_mesh.collect(),
             focus_m: (Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M) / FOCUS_STEP_M).round()
                 * FOCUS_STEP_M,
