@@ -11,8 +11,8 @@ that MuJoCo reads by itself: directly and, if it is refused, after `tandem impor
 docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
 without commands. It is called chaotic if MuJoCo itself differs as much with half the time step, and forced if it begins with
 a joint beyond its range or with bodies that overlap: soft limits and contacts then throw bodies as far as their stiffness
-decides. Other motion is "noted" if notes at load, or the report of the import, name what of the file is approximated or left
-out. The build folder is CARGO_TARGET_DIR, if that is set.
+decides. Other motion is "noted" if notes at load, or the report of the import, name what of the file's dynamics is approximated or
+left out. The build folder is CARGO_TARGET_DIR, if that is set.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ LIMIT_S = 300.0
 #: Outcomes of a file that is read: motion as in MuJoCo; other motion, but so has MuJoCo at another time step; other motion from
 #: a start beyond limits; other motion of a file whose notes say what is approximated; other motion.
 READ = ("same", "chaotic", "forced", "noted", "other")
+#: Notes on what has no effect on motion.
+LOOKS = re.compile(r"(: |^)(material|light|camera|texture|<sensor>|<key>|<skin>)")
 KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf", ".glb", ".gltf", ".ply"}
 
 
@@ -198,7 +200,7 @@ def outcome(
     word, far_m, far_deg, off = compared(found, expected)
     notes = [*dropped, *found["notes"]]
     if word == "other":
-        other = "noted" if notes else "other"
+        other = "noted" if any(not LOOKS.search(note) for note in notes) else "other"
         word = "chaotic" if is_chaotic(source, expected) else "forced" if expected["is_forced"] else other
     seconds = found["loaded_s"] + found["drawn_s"]
     measured = f"{1000 * far_m:.0f} mm {far_deg:.0f} deg, mass off by {100 * off:.1f} %, {seconds:.2f} s"
