@@ -14,10 +14,10 @@ the program (`sim/src/mjcf/support`), and a test keeps this page equal to it.
 * **approximated**: it has a similar effect, which the note describes. When a scene is read, the log names the first
   occurrence of each kind.
 * **ignored**: it affects neither motion nor images.
-* **refused**: a file that contains it is not read. The message lists all refused parts of a file at once. It names file,
-  line and the nearest named element, and says what to write instead. Values in the table are accepted, since they
-  describe what happens anyway. [`tandem import`](scenes.md#files-of-other-programs) converts refused files to supported
-  MJCF.
+* **refused**: a file that contains it is not read. The message lists all refused parts of a file at once. It names
+  file, line and the nearest named element, and says what to write instead. Values in the table are accepted, since
+  they describe what happens anyway. [`tandem import`](scenes.md#files-of-other-programs) converts refused files to
+  supported MJCF.
 
 Everything that is not in the table is refused, too, for example a misspelt attribute, or one of a newer MuJoCo. So are
 
