@@ -1,4 +1,5 @@
-//! Baked light: what it shows, that it is the same wherever it comes from, and how near it is to path tracing.
+//! Tests of baked light: its plausibility, its equality from cache, disk and computation, and its similarity
+//! to path tracing.
 
 use rapier3d::math::Vector;
 
@@ -21,8 +22,8 @@ const ROOMS: [&str; 10] = [
     "office_115",
     "restaurant_110",
 ];
-/// Least structural similarity of images to path tracing, more than that without baked light; and the least
-/// difference of both in each room.
+/// Minimum mean structural similarity of images to path tracing, and its minimum gain in each room over
+/// images without baked light.
 const MIN_SIMILARITY: f64 = 0.85;
 const MIN_GAIN: f64 = 0.0;
 /// Half of the sides of the test room, and its height.

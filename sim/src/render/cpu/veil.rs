@@ -49,7 +49,8 @@ impl Veils {
         self.layers[..self.count].iter().rev()
     }
 
-    /// Sets depth and ids where images with alpha show a surface. The layers are those of pixels' centres.
+    /// Sets depth and ids at pixels where an image with alpha shows a surface. The layers must be those at
+    /// the pixels' centres.
     pub(super) fn measure(&self, prepared: &Prepared, facets: &[Facet], rays: &Rays, frame: &mut Frame) {
         let width = frame.width as usize;
         for layer in self.farthest_first() {

@@ -85,7 +85,7 @@ impl PathRenderer {
         PathRenderer { room, movers, veils, no_room, lights, paths: PATHS, srgb, prepared }
     }
 
-    /// Returns the scenery at its poses.
+    /// Returns the scenery at these poses.
     fn scene(&self, placed: &PlacedScenery) -> Scene<'_> {
         Scene {
             space: space(&self.room, &self.movers, placed),
