@@ -40,7 +40,7 @@ pub struct ExecutionMemory {
 }
 
 impl Execution {
-    /// Creates the execution of an episode; `None` if robots do exactly as commanded. They are at `rest` at
+    /// Creates the execution of an episode; `None` if robots do exactly as commanded. They execute `rest` at
     /// first, and their policy takes over at `begin_s`.
     pub fn of(
         stress: Option<Stress>,

@@ -1,4 +1,4 @@
-//! Tests of plans: several commands in one call have the same effect as separate calls, also in a replay.
+//! Tests of plans. Several commands in one call have the same effect as separate calls, also in a replay.
 
 use serde_json::json;
 use tandem_episodes::{A, B, Session};

@@ -35,7 +35,7 @@ impl PathPace {
         self.follow();
     }
 
-    /// Stands for a command, while robots catch up with earlier ones.
+    /// Waits for one command, while robots catch up with earlier commands.
     pub fn stand(&mut self) {
         self.pace_m_s = 0.0;
         self.follow();

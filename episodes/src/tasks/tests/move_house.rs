@@ -139,6 +139,6 @@ fn place_on_both_sides_of_every_threshold() {
         assert!(placed(&inside), "{what} inside");
         assert!(!placed(&outside), "{what} outside");
     }
-    // A tilt of 15 degrees would lift feet off their marks; the limit is the common one of all placements.
+    // A tilt of 15 degrees would lift feet off their marks; the limit is the one that all placements share.
     assert!(!placed(&stands(Vector::ZERO, 0.0).turned("console_table", Vector::X, 0.3)));
 }

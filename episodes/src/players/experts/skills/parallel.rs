@@ -57,8 +57,8 @@ struct ScriptChannel {
     outcomes: Sender<CommandOutcome>,
 }
 
-/// Plays all scripts to their ends. Nothing moves before every script that still plays has sent its next
-/// command. Equal beginnings therefore have equal ends, whichever thread is faster.
+/// Runs all scripts to their ends. Nothing moves before every running script has sent its next command. The
+/// outcome therefore does not depend on the threads' timing.
 pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> Result<(), PlayerError> {
     let facts = commander.facts()?;
     thread::scope(|scope| {

@@ -53,7 +53,7 @@ pub struct TargetVelocity {
     pub turning_rad_s: f32,
 }
 
-/// Returns the base velocity with which a robot whose pelvis is at `at` reaches a place and stays there.
+/// Returns the velocity of a base at `at` with which the robot reaches a place and stays there.
 pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> BaseVelocity {
     let mut off_m = to.translation - at.translation;
     off_m.z = 0.0;
