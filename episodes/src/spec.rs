@@ -333,7 +333,7 @@ impl RobotFile {
         Ok(Arc::new(self.load()?.model))
     }
 
-    /// Checks that such a robot, read as `model`, has the hands that a task needs.
+    /// Checks that this robot, read as `model`, has the hands that a task needs.
     pub fn check_task(&self, model: &RobotModel, task: &Task) -> Result<(), RobotError> {
         if !task.needs_fingers() || model.has_fingers() {
             return Ok(());
@@ -361,7 +361,7 @@ impl Controller {
         }
     }
 
-    /// Returns the limits of the base commands that such a controller follows with this robot.
+    /// Returns the limits of the base commands that this controller follows with this robot.
     pub fn limits(&self, robot: &RobotFile) -> Result<BaseLimits, RobotError> {
         Ok(self.load()?.limits(&robot.load()?.model.scale))
     }

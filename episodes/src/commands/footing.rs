@@ -11,8 +11,8 @@ use crate::convert::{coarse, isometry_from_sim};
 /// Number of control steps within which a robot stops after a stop command, measured from 0.05 to 0.4 m/s in
 /// every direction. A robot that steps later has been pushed.
 const SETTLES_STEPS: u32 = 75;
-/// Maximum duration of a motion whose displacement is computed as speed times time, and maximum lag of the
-/// base behind that place.
+/// Maximum duration of a motion whose displacement is computed as speed times time, and maximum distance of
+/// the base from the place computed in this way.
 const SHORT_STEPS: u32 = 125;
 const LEASH_M: f64 = 0.25;
 /// Parameters of the coasting distance after longer walks, which grows with the speed:

@@ -54,7 +54,7 @@ pub struct DataSection<'a> {
     pub without_checksum: WithoutChecksum,
 }
 
-/// Number of parts without a checksum of their own.
+/// Number of parts without a separate checksum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WithoutChecksum {
     pub chunks: usize,

@@ -1,5 +1,5 @@
-//! Score of one episode: grasps, facts and phases, step by step. A live episode and its recording are
-//! scored alike.
+//! Score of one episode: grasps, facts and phases, step by step. A live episode and its recording are scored
+//! in the same way.
 
 use std::sync::Arc;
 

@@ -131,7 +131,7 @@ fn wrist_poses(side: Side, wrist: &WristPoses, sensed: &RobotSensed, motion: &Mo
     [target, isometry_from_sim(&sensed.pelvis_from_wrist[side])]
 }
 
-/// Converts the target and the measured pose of a wrist to those of a report in `frame`.
+/// Converts the target and the measured pose of a wrist to the report's poses in `frame`.
 fn wire_wrists(poses: [Isometry3<f64>; 2], frame: PoseFrame, motion: &Motion) -> [WirePose; 2] {
     let frame_from_pelvis = motion.pelvis_from(frame).inverse();
     let [target, mut measured] = poses.map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 /// Height of a slice, and minimum number of points in it.
 const SLICE_M: f64 = 0.01;
 const MIN_POINTS: usize = 5;
-/// Limits for a slice to be an arc: maximum distance of its points from the circle, also as a fraction of
-/// the radius; minimum angle of the arc; and the range of radii.
+/// Limits for a slice to be an arc: maximum distance of its points from the circle, also as a fraction of the
+/// radius; minimum angle of the arc; range of radii.
 const OFF_M: f64 = 0.002;
 const OFF_PART: f64 = 0.06;
 const MIN_ARC_RAD: f64 = 1.2;

@@ -31,9 +31,9 @@ const ABOVE_LEVER_M: f32 = 0.11;
 const DOWN_M: [f32; 4] = [-0.02, -0.05, -0.08, -0.11];
 /// Travel of a drawn bolt. The bolt reaches 20 mm into its hole.
 const DRAWN_M: f32 = 0.022;
-/// Position of the leaf's face, towards the robot that pushes, and distances from the hinge at which it
-/// pushes. The first is beside the lever. The last is farther in, so that the robot passes through the
-/// middle of the doorway.
+/// x coordinate of the leaf's face on the robot's side, in the leaf's frame, and distances from the hinge at
+/// which the robot pushes. The first is beside the lever. The last is nearer to the hinge, so that the robot
+/// passes through the middle of the doorway.
 const FACE_X_M: f32 = -0.045;
 const FIRST_RADIUS_M: f32 = 0.785;
 const LAST_RADIUS_M: f32 = 0.50;

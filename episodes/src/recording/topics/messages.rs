@@ -141,7 +141,8 @@ impl From<&RobotCommand> for Json<BaseCommandMessage> {
     }
 }
 
-/// Grip of a robot's hands: forces of the world on them (world frame), estimated from the arms' torques.
+/// Hands of a robot: forces of the world on them (world frame), estimated from the arms' torques, and objects
+/// that they hold or touch.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Hands")]
 pub struct HandsMessage {
@@ -374,8 +375,8 @@ impl ToolCallRecord {
         Ok(ToolCallRecord { time_s: at.time_s, message, pictures })
     }
 
-    /// Creates the record of a request that is no call of the episode, with its raw arguments: a plan, or a
-    /// call that was refused before it reached the episode.
+    /// Creates the record of a request that is no call of the episode, with its raw arguments. This is a
+    /// plan, or a call that was refused before it reached the episode.
     pub fn beside(
         at: CallMoment,
         caller: CallerRecord,

@@ -19,8 +19,8 @@ const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
 const ASIDE_M_S: f64 = 0.2;
 const TURN_RAD_S: f64 = 0.4;
-/// Distance and angle to its place at which a robot is stopped, since it coasts a little; and the larger
-/// distance at which a waypoint counts as passed.
+/// Distance and angle to its place at which a robot is stopped, since it coasts a little. The larger distance
+/// is that at which a waypoint counts as passed.
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;

@@ -167,7 +167,7 @@ mod tests {
     /// constant along their paths.
     #[test]
     fn robots_whose_places_fit_go_as_one_body() {
-        // The start frame of B in that of A, and the place of B relative to A.
+        // The pose of B's start frame in A's, and the place of B relative to A.
         let a_from_b = stand(1.3, 0.1, 2.9).start_from_stand();
         let stand_from_partner = stand(1.2, 0.05, PI).start_from_stand();
         let b_of = |a: &Stand| {

@@ -20,7 +20,7 @@ fn held() -> Facts {
     Facts::at_rest(&task()).held_by(&[B, C], "console_table")
 }
 
-/// Places the table's middle on that of the marks, offset by `beside_m` and rotated by `degrees`.
+/// Places the table's middle on the middle of the marks, offset by `beside_m` and rotated by `degrees`.
 fn at_marks(mut facts: Facts, beside_m: Vector, degrees: f32) -> Facts {
     let marks_m = facts.position_m("foot_marks");
     facts.object_mut("console_table").pose_in_world =

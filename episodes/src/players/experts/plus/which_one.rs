@@ -1,4 +1,4 @@
-//! The WhichOne expert: B fetches the wanted bottle from its shelf and holds it out through the hatch; A
+//! The WhichOne expert: B fetches the wanted bottle from its shelf and holds it out through the hatch. A
 //! takes it by the upper half and puts it on the pad.
 
 use std::f32::consts::{FRAC_PI_2, PI};

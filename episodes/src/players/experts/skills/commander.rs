@@ -13,7 +13,7 @@ const STEPS_PER_COMMAND: u32 = 10;
 /// Control steps of one command of a walking robot. Hands that are fixed in the world fall behind a robot
 /// that does not command them anew often enough.
 pub const WALK_STEPS: u32 = 5;
-/// Control steps of every command while several scripts are played at once.
+/// Control steps of every command while several scripts run at the same time.
 pub const BEAT_STEPS: u32 = WALK_STEPS;
 
 /// Targets of both wrists.

@@ -105,7 +105,7 @@ fn merge_commands(commander: &mut Commander, mut channels: Vec<ScriptChannel>) -
         let reply = commander.pass_on(MoveWrists { steps: BEAT_STEPS, robots })?;
         let facts = commander.facts()?;
         for channel in &channels {
-            // A script that has ended does not play on.
+            // A script that has ended receives no outcome.
             let _ = channel.outcomes.send(CommandOutcome { reply: reply.clone(), facts: facts.clone() });
         }
     }
