@@ -9,7 +9,7 @@ use crate::mjcf::{Geom, Gloss, Primitive};
 
 /// Cosine of the maximum tilt of a plane that carries fallen objects.
 const CARRIES_COSINE: f64 = 0.5;
-/// MJCF's defaults.
+/// Default friction of MJCF.
 const PLAIN: Friction = Friction {
     directions: Directions::Slide,
     slide: 1.0,

@@ -22,8 +22,8 @@ const ROOMS: [&str; 10] = [
     "office_115",
     "restaurant_110",
 ];
-/// Minimum mean structural similarity of images to path tracing, and its minimum gain in each room over
-/// images without baked light.
+/// Minimum structural similarity of images to path tracing in each room, which the mean without baked light
+/// does not reach; and the minimum gain from baked light in each room.
 const MIN_SIMILARITY: f64 = 0.85;
 const MIN_GAIN: f64 = 0.0;
 /// Half of the sides of the test room, and its height.
@@ -55,7 +55,7 @@ fn baked_room() -> BakedLight {
     bake(&room, walls_m)
 }
 
-/// Returns the light on the surface of the map that is nearest to a point and faces as given.
+/// Returns the light at a point, from the light map nearest to it.
 fn on_map(light: &BakedLight, point_m: Vector) -> LightTexel {
     let distance = |map: &&LightMap| {
         let [u, v] = map.place(point_m.to_array());

@@ -47,8 +47,8 @@ impl TriangleMesh {
 }
 
 impl UvMap {
-    /// Returns the map that interpolates the corners of a triangle, as [`Bend`] does for normals; that of its
-    /// first corner if it has no area.
+    /// Returns the map that interpolates the corners of a triangle, as [`Bend`] does for normals. For a
+    /// triangle without area the map is constant, with the coordinates of the first corner.
     fn between([a, b, c]: &[Vertex; 3]) -> UvMap {
         let (ab, ac) = (b.position_m - a.position_m, c.position_m - a.position_m);
         let face = ab.cross(ac);

@@ -1,4 +1,4 @@
-//! Hinges and slides of doors, drawers and the like: how far they are open, from the poses of two bodies.
+//! Hinges and slides, for example of doors and drawers: their opening, from the poses of two bodies.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
