@@ -111,8 +111,8 @@ impl SelfKnowledge {
     }
 }
 
-/// Returns the body from the simulator's state, which is bit-identical to it with ideal sensors. Masses are
-/// the model's, regardless of loads on a hand.
+/// Returns the body estimate from the simulator's state. With ideal sensors the two are bit-identical. Masses
+/// are the model's, regardless of loads on a hand.
 fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -> BodyEstimate {
     let mut com_m = Vector::ZERO;
     let mut com_velocity_m_s = Vector::ZERO;

@@ -251,7 +251,7 @@ mod tests {
         assert!((ideal.specific_force_m_s2 - Vector::Z * GRAVITY_M_S2).length() < 1e-4);
     }
 
-    /// The mean of many readings of one robot is off by its own bias, which its seed draws.
+    /// The mean of many readings of one robot is off by a constant bias, which depends on the seed.
     #[test]
     fn biases_stay() {
         const READINGS: usize = 100;

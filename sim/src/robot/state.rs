@@ -39,7 +39,8 @@ pub struct RobotEstimate {
     pub hand_force_n: Sides<Vector>,
 }
 
-/// State of a robot that only the simulator knows: for scoring, recordings, images and experts.
+/// State of a robot in the simulator, to which the robot has no access: for scoring, recordings, images and
+/// experts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotTruth {
     /// Pose of every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.

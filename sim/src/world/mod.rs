@@ -176,7 +176,7 @@ impl World {
     ///
     /// # Panics
     ///
-    /// Panics if the number of commands is not that of the robots.
+    /// Panics if the number of commands differs from the number of robots.
     pub fn control_step(&mut self, commands: &[RobotCommand]) -> Result<Step, Diverged> {
         self.step_by(commands, World::advance)
     }
@@ -207,8 +207,8 @@ impl World {
     ///
     /// # Panics
     ///
-    /// Panics if there is no such robot, or the number of setpoints is neither 1 nor that of the physics
-    /// steps.
+    /// Panics if there is no such robot, or if the number of setpoints is neither 1 nor the number of physics
+    /// steps in a control step.
     pub fn drive_motors(&mut self, robot: usize, setpoints: &[MotorSetpoints]) {
         self.robots[robot].set_motors(setpoints);
     }

@@ -17,8 +17,8 @@ const SPREAD_M: [f32; 2] = [0.08, 0.52];
 /// Range of footholds without strain; footholds of sideways walking are within it.
 const EASY_REACH_M: [f32; 2] = [-0.22, 0.3];
 const EASY_SPREAD_M: [f32; 2] = [0.12, 0.46];
-/// Paces to choose from, beside the gait's own. The capture point diverges exponentially, so a robot
-/// that was hit hurries to need a nearer foothold. At twice the pace of the gait the hips saturate as
+/// Paces to choose from, in addition to the gait's own pace. The capture point diverges exponentially, so a
+/// robot that was hit hurries to need a nearer foothold. At twice the pace of the gait the hips saturate as
 /// the foot lifts, and it meets the ground 15 cm before its foothold. Tuned on punches at shoulders and
 /// elbows, seeds 2000-2159.
 const FASTER: [f32; 4] = [1.175, 1.35, 1.525, 1.7];

@@ -422,7 +422,7 @@ mod tests {
         assert_eq!(lean_m(0.0, 0.1, 1.45), 0.0);
     }
 
-    /// While a hand holds something, the lean follows with a delay, and its prediction has no effect.
+    /// While a hand holds an object, the lean follows with a delay, and its prediction has no effect.
     #[test]
     fn a_robot_that_holds_something_leans_as_far_as_it_is_pushed_now() {
         let mut stand = Stand::plant(&Posed::standing().body(), 0.0, None);

@@ -119,7 +119,7 @@ impl Swing {
 
 /// Returns the height over the path along the ground, `time_s` after lift-off, with its first and second
 /// derivative:
-///   16 h p^2 (1 - p)^2,   p = t / T;   after T down, until something is met.
+///   16 h p^2 (1 - p)^2,   p = t / T;   after T downward, until the foot meets the ground.
 fn lift(time_s: f32) -> [f32; 3] {
     if time_s > AIR_S {
         return [PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0];

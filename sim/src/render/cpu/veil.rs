@@ -13,7 +13,7 @@ use crate::render::{Camera, Frame, PlacedScenery};
 #[derive(Default)]
 pub(super) struct Veils {
     layers: Vec<RenderTarget>,
-    /// Number of layers that show something.
+    /// Number of layers with any surface.
     count: usize,
 }
 
@@ -44,7 +44,7 @@ impl Veils {
         }
     }
 
-    /// Returns the layers that show something, the farthest first.
+    /// Returns the layers with any surface, the farthest first.
     pub(super) fn farthest_first(&self) -> impl Iterator<Item = &RenderTarget> {
         self.layers[..self.count].iter().rev()
     }

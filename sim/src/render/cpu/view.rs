@@ -1,4 +1,4 @@
-//! Resolution of samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
+//! Resolution of samples to pixels: colour where a camera's rays meet triangles, and outlines between bodies.
 
 use std::ops::Range;
 

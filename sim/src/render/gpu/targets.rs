@@ -29,7 +29,7 @@ pub(super) struct Targets {
     drawn: Buffer,
     pub samples: Attachments,
     pub centres: Attachments,
-    /// Layers of blended surfaces at samples and at centres; empty without such parts.
+    /// Layers of blended surfaces at samples and at centres; empty if no part is blended.
     pub veils: [Vec<VeilAttachments>; 2],
     /// Bind group 1 of `picture.wgsl`, with the first image in the buffer.
     pub group: BindGroup,

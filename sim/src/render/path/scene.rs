@@ -71,7 +71,8 @@ pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
 }
 
 impl Coat {
-    /// Returns the clear coat of a surface without its own gloss; otherwise a rougher coat, or metal.
+    /// Returns the coat of a surface: the clear coat if the surface has no gloss of its own, otherwise a
+    /// rougher coat, or metal.
     pub fn of(gloss: &Gloss) -> Coat {
         let width_2_ratio = gloss.roughness_factor.map_or(COAT_WIDTH_2, |roughness| {
             let squared = roughness.clamp(MIN_COAT_ROUGHNESS, 1.0) * roughness.clamp(MIN_COAT_ROUGHNESS, 1.0);

@@ -103,8 +103,8 @@ const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
 /// Focus radius for the lights of a file, whose scenes are seen as a whole.
 const LAMPS_FOCUS_RADIUS_M: f32 = 2.5;
-/// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
-/// into the room.
+/// Height of the lamps that the light represents. Walls and other parts of the room that reach higher cast no
+/// shadow into the room.
 const LAMPS_M: f32 = 2.2;
 /// The accent of each robot, in place of the material `accent` of the robot's file.
 const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];

@@ -28,8 +28,8 @@ pub struct Image {
     last_level: f32,
 }
 
-/// Position on an image: coordinates to the right and down, and their differences over the footprint's x and
-/// y.
+/// Position on an image: coordinates to the right and down. Their differences over a step in x and a step in
+/// y span the footprint of the lookup.
 #[derive(Clone, Copy)]
 pub struct ImagePlace {
     pub uv: [f32; 2],
@@ -109,7 +109,7 @@ impl Image {
         self.rgb(&self.place(on_cube(ray), on_cube(x_step), on_cube(y_step))).into()
     }
 
-    /// Returns the image position of three coordinates, given their differences over the footprint's x and y.
+    /// Returns the image position of three coordinates, given their differences over the steps in x and y.
     #[inline(always)]
     pub fn place(&self, values: [f32; 3], x_step_values: [f32; 3], y_step_values: [f32; 3]) -> ImagePlace {
         if self.is_cube {

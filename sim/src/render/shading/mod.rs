@@ -58,9 +58,9 @@ pub const HIGHLIGHT: f32 = 0.15;
 /// Background colour.
 pub const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 
-/// Strength of the darkening by an outline between two things.
+/// Strength of the darkening by an outline between two bodies.
 pub const OUTLINE: f32 = 0.45;
-/// Minimum relative depth difference for an outline between two things: there is none where they touch.
+/// Minimum relative depth difference for an outline between two bodies: there is none where they touch.
 pub const OUTLINE_DEPTH_STEP: f32 = 0.02;
 
 /// Texels along each side of the shadow map: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.

@@ -1,4 +1,5 @@
-//! Objects: all named things in a world except robots. A file with inner joints gives one object per link.
+//! Objects: all named bodies and marks in a world except robots. A file with inner joints gives one object
+//! per link.
 
 mod insert;
 #[cfg(test)]

@@ -137,7 +137,7 @@ impl ObjectModel {
             }
         };
         let mut trees = document.trees()?.into_iter();
-        // The first is the file's own world.
+        // The first tree is the file's own world.
         let world = trees.next().into_iter().flat_map(|world| world.links);
         let (Some(tree), None) = (trees.next(), trees.next()) else {
             return Err(document.unsupported("an object file has one top-level body"));

@@ -33,8 +33,8 @@ const STRONG_S: f32 = 0.1;
 const STILL_STRONG: f32 = 0.5;
 const WITHSTANDS_1_S: f32 = 5.0;
 const GIVES_WAY_1_S: f32 = 1.0;
-/// Factor and offset on the felt force: the estimate for a stretched arm is a quarter too small, and
-/// slower than the observer.
+/// Factor and offset on the sensed force: the estimate for a stretched arm is a quarter too small, and slower
+/// than the observer.
 const EXPLAINED_SHARE: f32 = 1.3;
 const EXPLAINED_M_S2: f32 = 0.2;
 /// Minimum unexplained push that counts as an error of the estimate while the hands hold an object: 17 N on a
@@ -89,8 +89,8 @@ impl Partner {
     }
 }
 
-/// Returns the part of a push that comes through the hands. It has the direction of the felt force and is not
-/// much larger.
+/// Returns the part of a push that comes through the hands. It has the direction of the sensed force and is
+/// not much larger.
 fn explained_m_s2(push_m_s2: Vector, felt_m_s2: Vector) -> Vector {
     let along = felt_m_s2.normalize_or_zero();
     let most_m_s2 = felt_m_s2.length() * EXPLAINED_SHARE + EXPLAINED_M_S2;

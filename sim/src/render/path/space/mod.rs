@@ -1,5 +1,5 @@
-//! All bodies in one state: the room, whose hierarchy is built once, and things at their poses, above which
-//! a small hierarchy is built for each state.
+//! All bodies in one state: the room, whose hierarchy is built once, and moving bodies at their poses. For
+//! each state, a small hierarchy is built over the moving bodies.
 
 pub mod body;
 
