@@ -23,8 +23,8 @@ pub enum LocomotionChoice {
 }
 
 impl LocomotionChoice {
-    /// Reads the policy of a file. If `looped` is true, the policy receives the velocity that keeps the robot
-    /// at the place to which the commands would have moved it, rather than the commands.
+    /// Reads the policy of a file. If `looped` is true, a position loop replaces the commands: the policy
+    /// receives the velocity that keeps the robot at the place to which the commands would have moved it.
     ///
     /// # Errors
     ///

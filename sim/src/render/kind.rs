@@ -14,7 +14,7 @@ pub enum RendererKind {
     Auto,
     /// The embedded renderer.
     Cpu,
-    /// A GPU, or a software implementation of its driver.
+    /// A GPU, or a software renderer in its place.
     Gpu,
     /// Path tracing on the CPU.
     Path,

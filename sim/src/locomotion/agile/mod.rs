@@ -6,9 +6,9 @@
 //! the robot's own estimate of its pose.
 //!
 //! The policy runs once per control step and drives the legs by PD targets with its own gains. It also
-//! balances with the roll and pitch of the waist, which belong to the task here. So the policy observes
-//! them minus the task's targets, as if the task had commanded an upright waist, and its targets for
-//! them are added to the task's.
+//! balances with the roll and pitch of the waist, which belong to the task here. Therefore the policy
+//! observes these joints minus the task's targets, as if the task had commanded an upright waist. Its targets
+//! for them are added to the task's targets.
 
 mod joints;
 mod motors;

@@ -247,7 +247,7 @@ impl Stand {
     }
 
     /// Returns the displacement, in one physics step, of a robot that yields to its partners along the pull
-    /// on its hands, with the centre of mass at `weights_m`. Both are in the heading frame.
+    /// on its hands. `weights_m` is its centre of mass. Both are in the heading frame.
     fn giving_way_m(&self, body: &BodyEstimate, load: &Load, weights_m: Vector, dt_s: f32) -> Vector {
         let scale = &body.model.scale;
         let pull_n = flat(body.hand_reaction_n.left + body.hand_reaction_n.right);

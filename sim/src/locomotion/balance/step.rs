@@ -8,7 +8,8 @@
 //! it: including it brought no gain. A foot put down at xi(T) - b  leaves the capture point the offset b from
 //! the new foot; see [`Gait`]. The centre of mass moves along with a leg that swings, and stops with it: v -
 //! s u is the lasting velocity, as given by the angular momentum about the ground. Without this term a robot
-//! that was hit steps too far, the farther the faster it steps, and at the next step too far the other way.
+//! that was hit steps too far. The faster it steps, the larger is the error, and the next step is too far the
+//! other way.
 //! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
@@ -356,8 +357,8 @@ fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
     })
 }
 
-/// Returns the required capture point at lift-off of the first foot, as a step that just ended would
-/// leave it, and true if the foot lifts now.
+/// Returns the required capture point at lift-off of the first foot, as a step that just ended would leave
+/// it. Also returns true if the foot lifts now.
 fn shift(now: &FootstepInputs) -> (Vector, bool) {
     let scale = now.scale;
     let target_m = now.steady_capture_m(scale.time_s(SWING_S));

@@ -70,9 +70,9 @@ impl Swing {
         self.position_m += self.velocity_m_s * dt_s;
     }
 
-    /// Returns the point nearest to `sole_m` where the sole can come to rest in time. The path starts without
-    /// jerk if it ends at
-    ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of the minimum-jerk path is zero.
+    /// Returns the point nearest to `sole_m` where the sole can come to rest in time. The minimum-jerk path
+    /// starts without jerk if it ends at
+    ///   x + 0.6 v T + 0.15 a T^2.
     pub(super) fn reachable_m(&self, scale: &BodyScale, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
         let remaining_s = ((AIR_S - time_s) / pace).max(0.0);
         let resting_m = self.sole_m(scale)

@@ -17,8 +17,8 @@ use crate::render::{PlacedScenery, Scenery};
 /// Number of paths per point, and number of sampled points on lamps.
 const PATHS: SampleCount = SampleCount(64);
 const LAMP_POINTS: SampleCount = SampleCount(32);
-/// Number of rays that decide if a point is inside an object, and the maximum share of them that may hit a
-/// back face first for a point outside.
+/// Number of rays that decide if a point is inside an object. For a point outside, at most this share of them
+/// may hit a back face first.
 const INSIDE_RAYS: SampleCount = SampleCount(16);
 const MAX_INSIDE_SHARE: f32 = 0.3;
 /// Distance from a surface at which rays that leave it start.

@@ -1,7 +1,7 @@
 //! Path tracing on the processor: light that bounces, soft shadows, and reflections in a clear coat.
 //!
-//! [`Space`] finds where rays meet the scenery, [`Scene`] computes the light along them, [`PathView`] finds
-//! and lights the surface of each pixel, [`filtered`] removes the noise of few paths, and [`Negative`]
+//! [`Space`] finds where rays meet the scenery, and [`Scene`] computes the light along them. [`PathView`]
+//! finds and lights the surface of each pixel, [`filtered`] removes the noise of few paths, and [`Negative`]
 //! converts light to colours. An image is the same bit for bit on any number of threads.
 
 mod develop;

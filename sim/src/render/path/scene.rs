@@ -31,7 +31,7 @@ const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
 /// Minimum cosine between the normal of a mirror and the z axis of its mesh.
 const MIN_MIRROR_COSINE: f32 = 0.999;
-/// Width over which the images of surfaces are averaged that reflect light on a path.
+/// Width over which images on surfaces that reflect light on a path are averaged.
 const REFLECTED_WIDTH_M: f32 = 0.02;
 
 /// A state of a scenery, ready to be traced.
@@ -196,9 +196,9 @@ impl Scene<'_> {
         layers_rgb[COATED] += lit_rgb * (PI * density * reflected * 0.25);
     }
 
-    /// Adds the light of one path through the coat to the layers of a visible point. It may also add that of
-    /// one path reflected by the coat. `through` and `mirrored` are the random numbers for the directions of
-    /// the two.
+    /// Adds the light of one path through the coat to the layers of a visible point. It may also add the
+    /// light of one path that the coat reflects. `through` and `mirrored` are the random numbers for the
+    /// directions of these paths.
     pub fn light_indirectly(
         &self,
         spot: &Spot,

@@ -29,9 +29,9 @@ const MEAN_LUMINANCE: f32 = 0.18;
 /// dynamic range of 68 dB.
 const FULL_WELL: f32 = 4300.0;
 const READ_NOISE: f32 = 1.7;
-/// Electrons that a pixel collects per second from a white surface in linear light 1. Assumed: 500 lx (EN
-/// 12464-1, offices), a lens of f/2.0 that passes 28 lx to the sensor, 8000 photons per second and lux on 1.4
-/// um squared, and 0.3 electrons per photon behind the colour filter.
+/// Electrons per second in a pixel that sees a white surface in linear light 1. Assumed: an illuminance of
+/// 500 lx (EN 12464-1, offices), and a lens of f/2.0 that passes 28 lx to the sensor; 8000 photons per second
+/// and lux on 1.4 um squared, and 0.3 electrons per photon behind the colour filter.
 const WHITE_1_S: f32 = 7e4;
 /// Shares of the sensor's pixels with a red, green and blue filter.
 const FILTERED: [f32; 3] = [0.25, 0.5, 0.25];

@@ -27,8 +27,8 @@ impl CameraMotion {
     }
 
     /// Returns the velocity, relative to the focal length, at which the pixel of the ray `(x, y, 1)` moves
-    /// over the image of a static world, x right and y down. It is minus the optical flow of Longuet-Higgins
-    /// and Prazdny 1980:
+    /// over the image of a static world. Here x is right and y down. The velocity is minus the optical flow
+    /// of Longuet-Higgins and Prazdny 1980:
     ///
     ///   dx/dt = (vx - x vz) / z + wy (1 + x^2) - wz y - wx x y,
     ///   dy/dt = (vy - y vz) / z - wx (1 + y^2) + wz x + wy x y.

@@ -148,8 +148,8 @@ fn bright_scenes_are_exposed_for_less_long_and_dark_ones_with_gain() {
     assert!(dark.time_s == 0.033 && bright.time_s < 0.02, "{dark:?} {bright:?}");
 }
 
-/// Returns for each image row the column of a vertical edge, which is at column 160 in the ideal image, and
-/// the number of blurred pixels between dark and bright.
+/// Returns for each row the column of a vertical edge, and the number of blurred pixels between dark and
+/// bright. The edge is at column 160 in the ideal image.
 fn edge(depth_m: f32, motion: CameraMotion) -> Vec<[f32; 2]> {
     let ideal = each_pixel(|u, _| if u < 160 { [40; 3] } else { [200; 3] }).concat();
     let light = SensorLight::of(&ideal, WIDTH as u32, HEIGHT as u32);

@@ -100,8 +100,8 @@ impl Image {
         }
     }
 
-    /// Returns the linear colour of the sky along a ray (world frame), averaged over the footprint between
-    /// the steps in x and y.
+    /// Returns the linear colour of the sky along a ray (world frame), averaged over the footprint of the
+    /// steps in x and y.
     #[inline(always)]
     pub fn sky_rgb(&self, ray: Vector, [x_step, y_step]: [Vector; 2]) -> Vector {
         // The cube's y axis points up. Source: MuJoCo's `render_gl3.c`.

@@ -56,7 +56,7 @@ pub struct SurfacePoint {
     pub point_m: Vector,
     /// Unit vector.
     pub normal: Vector,
-    /// Grid position of the point, for its random numbers. Those of neighbours complement each other.
+    /// Grid position of the point, for its random numbers. The numbers of neighbours complement each other.
     pub seed: [u32; 2],
 }
 
