@@ -236,7 +236,7 @@ pub enum HandPart {
     Palm,
 }
 
-/// Contact of a hand, as far as it can feel it.
+/// Contact that a hand can feel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Touch {

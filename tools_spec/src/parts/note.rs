@@ -45,7 +45,7 @@ pub struct Note {
     /// Seconds that the model took. Null: unknown.
     #[schemars(range(min = 0, max = MAX_SECONDS))]
     pub seconds: Option<f64>,
-    /// End of the model's play. Null: it goes on.
+    /// End of the model's play. Null: none yet.
     pub ending: Option<AgentEnding>,
 }
 

@@ -98,7 +98,7 @@ pub struct RobotState {
     /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallen: Option<bool>,
-    /// Readings of its sensors in each physics step of the last control step, where the call asks for
+    /// Readings of its sensors in each physics step of the last control step, if the call requests
     /// `samples`; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SensorSamples>,

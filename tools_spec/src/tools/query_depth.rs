@@ -265,7 +265,7 @@ pub struct DepthReply {
     /// visible object. Left out where none was requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
-    /// Plane, edges and corners of the region; left out where `fit` was not asked for.
+    /// Plane, edges and corners of the region; left out unless `fit` was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<RegionFit>,
     /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply without points.

@@ -98,7 +98,7 @@ impl Tool for SendJointDrives {
         self.robots.iter().map(|entry| entry.robot.as_str()).collect()
     }
 
-    /// Returns one a row; every robot has as many.
+    /// Returns one step per row. All robots have the same number of rows.
     fn steps(&self) -> u32 {
         checks::row_steps(self.robots.first().map(|entry| &entry.rows))
     }

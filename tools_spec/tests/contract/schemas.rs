@@ -122,7 +122,7 @@ fn nullable_fields_may_be_left_out() {
     assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
-/// Checks that a refusal contains every one of `says`.
+/// Checks that a refusal contains every text in `says`.
 fn refused(name: &str, args: Value, says: &[&str]) {
     let text = match ToolCall::parse(name, args.clone()) {
         Ok(call) => panic!("{name} {args} was accepted: {call:?}"),
@@ -403,7 +403,7 @@ fn bodies_of_an_episode_name_its_own_robots() {
     }
 }
 
-/// Fields for operators need operators, and the body's schema says so.
+/// Fields about operators require operators, as the body's schema states.
 #[test]
 fn a_start_says_what_only_operators_can_have() {
     let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);

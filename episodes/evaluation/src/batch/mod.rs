@@ -143,7 +143,7 @@ impl Batch {
     ///
     /// # Errors
     ///
-    /// If an action is invalid, or a world has no episode under way.
+    /// If an action is invalid, or a world has no episode in progress.
     pub fn step(
         &mut self,
         step: BatchStep,
@@ -234,7 +234,7 @@ impl Batch {
     ///
     /// # Errors
     ///
-    /// If there is no such world, or it has no episode under way.
+    /// If there is no such world, or it has no episode in progress.
     pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
         self.ask(world, |session| {
             let robots = session.spec().task.robots.len();
@@ -246,7 +246,7 @@ impl Batch {
     ///
     /// # Errors
     ///
-    /// If there is no such world, or it has no episode under way.
+    /// If there is no such world, or it has no episode in progress.
     pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
         self.ask(world, |session| session.state_hash())
     }

@@ -73,7 +73,7 @@ pub struct SeenStep {
     pub seen: SeenWorld,
     /// Final observation of the episode, if the next one has begun in the same step.
     pub last: Option<SeenWorld>,
-    /// True if images are still to be rendered, together with those of other worlds.
+    /// True if images have been deferred, to be rendered together with images of other worlds.
     pub undrawn: bool,
 }
 
@@ -125,7 +125,7 @@ impl BatchWorld {
         let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
         let session = Session::start(&episode, folder.as_deref())?;
         if let Some(reason) = session.recording_failed() {
-            // A caller that wants a recording has no use for an unrecorded episode.
+            // A caller that requests a recording has no use for an unrecorded episode.
             return Err(BatchError::NotRecorded { seed, reason: reason.into() });
         }
         let session = self.session.insert(session);
