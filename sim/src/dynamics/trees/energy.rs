@@ -1,14 +1,14 @@
 //! Removal of spurious kinetic energy from fast trees.
 //!
 //! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates.
-//! Below a twentieth of a radian per step neither matters. A fallen robot that thrashes about is faster.
-//! There the two together feed kinetic energy, the more the faster the robot is, without bound. In truth
-//! Coriolis forces do no work. With the impulses P of everything else,
+//! Below 0.05 rad per step neither matters, but a fallen robot that thrashes about is faster. At such speeds
+//! both together add kinetic energy, without bound as the speed grows. Real Coriolis forces do no work. With
+//! the impulses P of everything else,
 //!   M (v' - v) = P - dt h,   so that the work is
 //!   P . (v + v') / 2 = K(q, v') - K(q, v) + dt h . (v + v') / 2,
 //! and a step ought to end with
 //!   K = K(q, v') + dt h . (v + v') / 2.
-//! Likewise its momentum and the moment of it, H = sum I_i v_i about a fixed point, ought to be
+//! Likewise the linear momentum and the moment of momentum, H = sum I_i v_i about a fixed point, ought to be
 //!   H = H(q, v') + dt sum f_i,   f_i the Coriolis and gyroscopic forces of the links.
 //! A tree's motion is that of one rigid body with its H, plus that of its links against each other. The
 //! two are orthogonal in M (Koenig), and their energies add up. The first is set so that H is as above;
