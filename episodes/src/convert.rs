@@ -54,7 +54,7 @@ pub fn coarse(value: f64) -> f64 {
     rounded_to(3, value)
 }
 
-/// Rounds to six decimals. Zero has no sign: `-0.0` would look like a finding.
+/// Rounds to six decimals. Zero has no sign: `-0.0` would look meaningful.
 pub fn rounded(value: f64) -> f64 {
     rounded_to(6, value)
 }

@@ -19,7 +19,7 @@ use crate::words::OwnWords;
 /// {"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}
 /// ```
 ///
-/// A text that is missing in the file keeps the task's own wording.
+/// A text that is missing in the file leaves the task's own wording in place.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Instructions(BTreeMap<String, TaskInstructions>);

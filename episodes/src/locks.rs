@@ -55,8 +55,8 @@ impl FileLock {
                 LockKind::Shared => file.try_lock_shared(),
             };
             match locked {
-                // A former holder may have removed or renamed the file since it was opened: then it is no
-                // longer this one.
+                // A former holder may have removed or renamed the file since it was opened. The path then
+                // refers to another file, or to none.
                 Ok(()) if is_at(&file, path)? => {
                     return Ok(Locking::Locked(FileLock { file, remove: None }));
                 }

@@ -79,7 +79,7 @@ pub struct EpisodeSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
     /// Kind of command over the robots: by one policy, or by one operator for each robot. Operators have
-    /// clocks of their own, which the host keeps.
+    /// separate clocks, which the host keeps.
     #[serde(default, skip_serializing_if = "Operators::is_one")]
     pub operators: Operators,
 }
@@ -257,8 +257,8 @@ impl EpisodeSpec {
         found.into_iter().flatten().chain(variation.departures()).collect()
     }
 
-    /// Returns the index of the phase at which the episode starts, and which alone counts; `None` for
-    /// others.
+    /// Returns the index of the phase at which the episode starts, and which alone counts; `None` for other
+    /// starts.
     pub fn start_phase(&self) -> Option<usize> {
         match &self.start {
             Start::Phase(start) => {
@@ -314,7 +314,7 @@ impl RobotFile {
     ///
     /// # Errors
     ///
-    /// An unreadable file, or [`RobotError::Changed`].
+    /// If the file cannot be read, or [`RobotError::Changed`].
     pub fn load(&self) -> Result<RobotSource, RobotError> {
         let own = match self {
             RobotFile::Embedded(name) => return Ok(RobotSource::embedded(name)?),
@@ -333,7 +333,7 @@ impl RobotFile {
         Ok(Arc::new(self.load()?.model))
     }
 
-    /// Checks that such a robot, read as `model`, has the hands that a task needs.
+    /// Checks that this robot, read as `model`, has the hands that a task needs.
     pub fn check_task(&self, model: &RobotModel, task: &Task) -> Result<(), RobotError> {
         if !task.needs_fingers() || model.has_fingers() {
             return Ok(());
@@ -361,7 +361,7 @@ impl Controller {
         }
     }
 
-    /// Returns the limits of the base commands that such a controller follows with this robot.
+    /// Returns the limits of the base commands that this controller follows with this robot.
     pub fn limits(&self, robot: &RobotFile) -> Result<BaseLimits, RobotError> {
         Ok(self.load()?.limits(&robot.load()?.model.scale))
     }

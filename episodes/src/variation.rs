@@ -26,7 +26,7 @@ pub struct Variation {
 
 impl Variation {
     pub const MAX_VARIETY: u8 = 3;
-    /// Well above the level at which experts fail in most episodes.
+    /// Maximum of `disturb`, well above the level at which experts fail in most episodes.
     pub const MAX_DISTURB: f32 = 5.0;
 
     pub(crate) fn is_benchmarks(&self) -> bool {

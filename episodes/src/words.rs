@@ -7,7 +7,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::tasks::{Task, TaskWords};
 
-/// Instructions in a file for one task. The task's own remain wherever the file has none.
+/// Instructions in a file for one task. The task's own instructions remain wherever the file has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "RecordedWords")]
 pub struct OwnWords {
@@ -22,7 +22,7 @@ pub struct OwnWords {
 }
 
 /// Hashes of the benchmark's published instructions, joint and for each robot, which a user's file may
-/// contain. One for each task, in the order of [`crate::tasks::cohub`].
+/// contain. There is one hash for each task, in the order of [`crate::tasks::cohub`].
 const BENCHMARK_WORDS: [&str; 10] = [
     "e6e83c5720b2bda4",
     "811edfc525362d72",
@@ -71,7 +71,7 @@ impl OwnWords {
         task.is_benchmark() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
     }
 
-    /// Returns the instructions of `task` with these in place of those that they replace.
+    /// Returns `words`, the instructions of `task`, with these texts in place of those that they replace.
     pub fn over(&self, task: &Task, words: TaskWords) -> TaskWords {
         let TaskWords { joint, shared, robots } = words;
         let own = |(name, text): (&str, String)| self.robots.get(name).cloned().unwrap_or(text);

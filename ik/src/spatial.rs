@@ -1,6 +1,7 @@
 //! SE(3): logarithm and the inverse of its left Jacobian.
 //!
-//! Twists are ordered [linear m; angular rad]. Source: Barfoot, State Estimation for Robotics, 2017, chapter 7.
+//! Twists are ordered [linear m; angular rad]. Source: Barfoot, State Estimation for Robotics, 2017, chapter
+//! 7.
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
 
@@ -47,7 +48,7 @@ pub struct Log6 {
 }
 
 impl Log6 {
-    /// Evaluates at `pose`.
+    /// Computes the logarithm and the blocks at `pose`.
     pub fn of(pose: &Isometry3<f64>) -> Log6 {
         let w = log3(&pose.rotation);
         let diagonal = left_jacobian_inverse3(&w);

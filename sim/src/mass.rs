@@ -1,8 +1,8 @@
 //! Mass properties of bodies from inertia matrices, densities and sums.
 //!
-//! Parry's eigenvectors of an inertia matrix are wrong if its entries differ by less than about 1e-5: the long
-//! axis of a pencil would have the inertia of another one. Masses are therefore multiplied by a power of two,
-//! which rounds nothing, until their inertia is about 1000 kg m^2.
+//! Parry's eigenvectors of an inertia matrix are wrong if its entries differ by less than about 1e-5: the
+//! long axis of a pencil would get the inertia of another axis. Masses are therefore multiplied by a power of
+//! two, which adds no rounding error, until their inertia is about 1000 kg m^2.
 
 use rapier3d::math::{Matrix, Vector};
 use rapier3d::prelude::MassProperties;
@@ -35,7 +35,7 @@ pub fn at_unit_density(mass_of_density: impl Fn(f32) -> MassProperties) -> MassP
     scaled(mass_of_density(factor), factor.recip())
 }
 
-/// Returns a power of two, by which eigenvectors of an inertia are computed well.
+/// Returns the power of two at which eigenvectors of an inertia are accurate.
 fn factor_for(inertia_kg_m2: f32) -> f32 {
     if !inertia_kg_m2.is_normal() {
         return 1.0;
@@ -92,7 +92,7 @@ mod tests {
         let hull = SharedShape::convex_hull(&corners).expect("a hull");
         let mut of_hull = at_unit_density(|density| hull.mass_properties(density));
         of_hull.set_mass(mass_kg, true);
-        // Parry sums up a hull in single precision.
+        // Parry integrates over a hull in single precision.
         assert!(deviation(of_hull, expected) < 1e-3, "{of_hull:?}");
 
         let half = SharedShape::cuboid(half_m.x, 0.5 * half_m.y, half_m.z).mass_properties(density_kg_m3);

@@ -1,6 +1,6 @@
 //! The owner of a collider, encoded in its tag.
 
-/// Owner of a collider; colliders without one belong to the room.
+/// Owner of a collider. Colliders without an owner belong to the room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
     Link { robot: usize, link: usize },

@@ -11,7 +11,7 @@ pub fn heading_rad(pose: &Pose) -> f32 {
     forward.y.atan2(forward.x)
 }
 
-/// Returns the same angle within half a turn of zero.
+/// Returns the equivalent angle within half a turn of zero.
 pub fn wrapped_rad(angle_rad: f32) -> f32 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }

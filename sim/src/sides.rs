@@ -33,7 +33,7 @@ impl Side {
         }
     }
 
-    /// Returns the sign of y on this side: 1 left, -1 right. It mirrors sideways parts of vectors, and
+    /// Returns the sign of y on this side: 1 left, -1 right. It mirrors lateral components of vectors, and
     /// roll and yaw of joints.
     pub fn sign(self) -> f32 {
         match self {
@@ -43,8 +43,8 @@ impl Side {
     }
 }
 
-/// A pair with one value for each side: `feet[Side::Left]`. It is serialised and hashed as the left one,
-/// then the right one.
+/// A pair with one value for each side: `feet[Side::Left]`. It is serialised and hashed as the left value,
+/// then the right value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sides<T> {
     pub left: T,

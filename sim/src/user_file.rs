@@ -1,4 +1,5 @@
-//! Reading of files that users name: regular ones of a bounded size, because a device or a pipe has no end.
+//! Reading of files that users name. Only regular files of a bounded size are read, because a device or a
+//! pipe has no end.
 
 use std::{
     fs::{self, File},

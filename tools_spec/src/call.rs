@@ -1,5 +1,5 @@
-//! A call on an episode by a program: the tool, and the fields beside the tool's own arguments. Models do not
-//! see these fields: they are in the schemas of bodies, and not in those of tools.
+//! A tool call on an episode by a program: the tool, and fields in addition to the tool's arguments. Models
+//! do not see these fields: the schemas of request bodies contain them, the schemas of tools do not.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -15,7 +15,7 @@ use crate::tools::{
     Expectation, GetRobotState, Observation, Observe, PlannedCommand, SendPlan, StartEpisode, WalkTo,
 };
 
-/// A call on an episode. It serialises to what [`Call::parse`] reads.
+/// A call on an episode. [`Call::parse`] can parse its serialized form.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Call {
     /// The tool and its arguments.
@@ -27,14 +27,15 @@ pub struct Call {
     /// Required step of the episode, if the tool is a command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_step: Option<u32>,
-    /// Observation to make once a command is done.
+    /// Observation to make when the command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
-    /// True for the readings of every physics step, if the tool is `get_robot_state` or `observe`.
+    /// True to include the sensor readings of every physics step, if the tool is `get_robot_state` or
+    /// `observe`.
     #[serde(skip_serializing_if = "is_false")]
     pub samples: bool,
-    /// True for a short reply, without values that are as expected. Observations have a separate field for
-    /// that.
+    /// True for a short reply, which omits values that are as expected. `observe` has a separate field for
+    /// this.
     #[serde(skip_serializing_if = "is_false")]
     pub short: bool,
 }
@@ -43,7 +44,7 @@ fn is_false(flag: &bool) -> bool {
     !flag
 }
 
-/// Fields of every tool that has none of the same name.
+/// Fields of every tool that has no field of the same name.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct WithAll {
@@ -66,12 +67,12 @@ pub struct Look {
     pub formats: Formats,
 }
 
-/// Fields beside those of `get_robot_state` and `observe`.
+/// Additional fields of `get_robot_state` and `observe`.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 struct WithState {
-    /// True: `samples` of the state has the readings of its sensors in each physics step of 5 ms since the
-    /// last control step.
+    /// True: `samples` of the state are the sensor readings of each 5 ms physics step since the last control
+    /// step.
     samples: Option<bool>,
 }
 
@@ -79,15 +80,14 @@ impl WithState {
     const FIELDS: [&str; 1] = ["samples"];
 }
 
-/// Fields beside those of a command.
+/// Additional fields of commands.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 struct WithCommand {
-    /// The step that the episode has to stand at, as the `step` of an earlier reply has it; where it stands
-    /// at another, the command is refused with 409 and nothing moves. Null: at any.
+    /// Required step of the episode, as in the `step` of an earlier reply; at another step, the command is
+    /// refused with 409 and nothing moves. Null: any.
     #[schemars(range(max = u32::MAX))]
     expected_step: Option<u32>,
-    /// Arguments of observe: the reply then has as `observation` what is seen when the command is done.
-    /// Null: nothing.
+    /// Arguments of observe: the reply then has an `observation` from the end of the command. Null: none.
     #[schemars(extend("properties" = observe_properties(), "additionalProperties" = false))]
     observe: Option<Map<String, Value>>,
 }
@@ -97,7 +97,7 @@ impl WithCommand {
 }
 
 impl Call {
-    /// Parses the call of tool `name` with the arguments `args` and the fields beside them.
+    /// Parses the call of tool `name` from the arguments `args`, which include the additional fields.
     pub fn parse(name: &str, mut args: Value) -> Result<Call, SpecError> {
         let short = match EPISODE_TOOLS.iter().find(|tool| **tool == name && name != Observe::NAME) {
             Some(tool) => beside::<WithAll>(tool, &mut args, &WithAll::FIELDS)?.short.unwrap_or(false),
@@ -132,26 +132,26 @@ impl Call {
         self.tool.name()
     }
 
-    /// Returns the robots that the call and the observation after it name.
+    /// Returns the robots that the call and its observation name.
     pub fn robots(&self) -> Vec<&str> {
         let then = self.then.iter().flat_map(|look| look.observe.robots());
         self.tool.robots().into_iter().chain(then).collect()
     }
 
-    /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+    /// Returns the number of requested control steps of 20 ms; 0 if the call is not a command.
     pub fn steps(&self) -> u32 {
         self.tool.steps()
     }
 
-    /// Returns true for `observe` with `short` among its arguments, if its caller reads images. Programs that
-    /// request arrays get all numbers.
+    /// Returns true for `observe` with `short`, unless the caller requests arrays. Programs that request
+    /// arrays get all numbers.
     pub fn looks_shortly(&self) -> bool {
         let is_short =
             matches!(&self.tool, ToolCall::Look(LookCall::Observe(args)) if args.short == Some(true));
         is_short && self.formats.images != Some(ImageFormat::Rgb) && self.formats.depth.is_none()
     }
 
-    /// Observations that name no robot become those of `robot`.
+    /// Limits observations that name no robot to `robot`.
     pub fn looking_through(mut self, robot: &str) -> Call {
         let then = self.then.as_mut().map(|look| &mut look.observe);
         let own = match &mut self.tool {
@@ -168,7 +168,7 @@ impl Call {
         self
     }
 
-    /// Checks a call that was built in Rust rather than read from JSON; [`Call::parse`] has already done it.
+    /// Checks a call that was built in Rust. [`Call::parse`] has already checked calls from JSON.
     pub fn validate(&self) -> Result<(), SpecError> {
         self.tool.validate()?;
         match &self.then {
@@ -198,13 +198,13 @@ impl From<Look> for Call {
 }
 
 impl Look {
-    /// Parses arguments of `observe` with formats among them.
+    /// Parses arguments of `observe`, which may include formats.
     pub fn parse(mut args: Value) -> Result<Look, SpecError> {
         let formats = beside(Observe::NAME, &mut args, &Formats::FIELDS)?;
         Ok(Look { observe: parse_args(args)?, formats })
     }
 
-    /// Returns the call alone.
+    /// Returns the call without the formats.
     fn call(&self) -> ToolCall {
         self.observe.clone().into()
     }
@@ -240,13 +240,13 @@ impl SendPlan {
 /// A parsed command of a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
-    /// Name of its place in messages.
+    /// Name of the command's place in the plan, for messages.
     pub place: String,
     /// The command.
     pub call: PlannedCall,
     /// Conditions that have to hold after the command.
     pub expects: Expectation,
-    /// True if the command ends as soon as they hold.
+    /// True if the command ends as soon as the conditions hold.
     pub until: bool,
     /// True for a short reply, if it is the last executed command.
     pub short: bool,
@@ -262,7 +262,7 @@ pub enum PlannedCall {
 }
 
 impl PlannedCall {
-    /// Returns the name of its tool.
+    /// Returns the name of the tool.
     pub fn name(&self) -> &'static str {
         match self {
             PlannedCall::Act(call) => call.name(),
@@ -271,7 +271,7 @@ impl PlannedCall {
     }
 }
 
-/// Parses the arguments of `start_episode`, and the fields on the drivers of the episode.
+/// Parses the arguments of `start_episode` and the fields about the episode's operators.
 pub fn parse_start(mut args: Value) -> Result<(StartEpisode, Driving), SpecError> {
     let driving: Driving = beside(StartEpisode::NAME, &mut args, &Driving::FIELDS)?;
     let invalid = |reason| SpecError::Invalid { tool: StartEpisode::NAME, reason };
@@ -279,7 +279,7 @@ pub fn parse_start(mut args: Value) -> Result<(StartEpisode, Driving), SpecError
     Ok((parse_args(args)?, driving))
 }
 
-/// Takes `fields` out of the arguments of `tool` and parses them.
+/// Removes `fields` from the arguments of `tool` and parses them.
 fn beside<T: DeserializeOwned + Default>(
     tool: &'static str,
     args: &mut Value,
@@ -295,8 +295,7 @@ fn beside<T: DeserializeOwned + Default>(
         .map_err(|error| SpecError::Invalid { tool, reason: format!("{}: {}", error.path(), error.inner()) })
 }
 
-/// Returns every tool. The schema of its body includes the fields that programs may send beside its
-/// arguments.
+/// Returns every tool. The schema of a tool's body includes the additional fields that programs may send.
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     let wording = wording.into();
     let mut specs = every_tool_spec(wording);
@@ -341,7 +340,8 @@ fn properties_of(mut schema: Value) -> Map<String, Value> {
     schema["properties"].as_object_mut().map(std::mem::take).unwrap_or_default()
 }
 
-/// Returns the schema of `observe` beside a command. Its texts are replaced together with the command's own.
+/// Returns the schema of `observe` as a field of a command. Its texts are adapted together with the
+/// command's.
 fn observe_properties() -> Value {
     let own = properties_of(plain_schema::<Observe>()).into_iter();
     json!(own.chain(properties_of(plain_schema::<Formats>())).collect::<Map<_, _>>())
@@ -391,7 +391,7 @@ mod tests {
         assert_eq!(json!(Call::from(ToolCall::from(GetStatus::default()))), json!({}));
     }
 
-    /// Every tool has the same field for a short reply, and its serialised form can be parsed.
+    /// Every tool has the field for a short reply, and its serialized form can be parsed.
     #[test]
     fn every_tool_takes_short() {
         for call in ToolCall::examples() {

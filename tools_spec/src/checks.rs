@@ -1,10 +1,10 @@
-//! Checks that need no world. Each returns a sentence for the caller, with the mistake, its place and a valid
+//! Checks that need no world. Each error is a sentence for the caller with the mistake, its place and a valid
 //! value.
 
 use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
 
-/// Checks that every number is finite and of sane size.
+/// Checks that every number is finite and not too large.
 pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
     match values.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
         Some(number) => Err(format!("{place} holds {number}; every number must be finite, from -1e6 to 1e6")),
@@ -12,12 +12,12 @@ pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Checks that the given values of a base command, in the order of its columns, are finite.
+/// Checks that the given values of a base command are finite. They are in the order of the command's columns.
 pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
     BASE_COLUMNS.iter().zip(command).try_for_each(|(column, part)| finite(column, part.as_slice()))
 }
 
-/// Checks that a quaternion has a direction. Its length does not matter: it is normalised before use.
+/// Checks that a quaternion has a direction. Its length does not matter, because it is normalized before use.
 pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String> {
     finite(place, quaternion_wxyz)?;
     if quaternion_wxyz.iter().all(|part| part.abs() < SMALLEST_COMPONENT) {
@@ -29,7 +29,7 @@ pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String>
     Ok(())
 }
 
-/// Checks a position and an orientation. Each may be left out.
+/// Checks a position and an orientation, both of which are optional.
 pub fn pose(
     side: &str,
     position_m: Option<&[f64; 3]>,
@@ -44,8 +44,8 @@ pub fn pose(
     Ok(())
 }
 
-/// Checks that there is at least one control step. The largest number depends on the protocol, which the
-/// episode knows.
+/// Checks that there is at least one control step. The episode checks the maximum, which depends on the
+/// protocol.
 pub fn steps(steps: u32) -> Result<(), String> {
     if steps == 0 {
         return Err(
@@ -55,7 +55,7 @@ pub fn steps(steps: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that there is at least one robot, none of them twice.
+/// Checks that there is at least one robot and that no robot is named twice.
 pub fn robots(names: &[&str]) -> Result<(), String> {
     if names.is_empty() {
         return Err("robots is empty; name at least one robot, for example \"A\"".into());
@@ -67,10 +67,10 @@ pub fn robots(names: &[&str]) -> Result<(), String> {
     }
 }
 
-/// A region of the whole image fits with this stride.
+/// Maximum stride that an error suggests. A region of the whole image is allowed with it.
 const WIDEST_STRIDE: u32 = 20;
 
-/// Checks that there is at least one pixel, and not too many. The episode checks that they are in the image.
+/// Checks that there is at least one pixel and not too many. The episode checks that pixels are in the image.
 pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     if pixels.is_empty() {
         return Err("pixels is empty; give at least one [u, v], for example [[160, 120]]".into());
@@ -84,7 +84,7 @@ pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that a region names pixels, and not too many.
+/// Checks that the stride of a region is not zero, and that the region does not contain too many pixels.
 pub fn region(region: &PixelRegion) -> Result<(), String> {
     if region.stride == 0 {
         return Err(
@@ -104,7 +104,7 @@ pub fn region(region: &PixelRegion) -> Result<(), String> {
     Err(format!("region names {count} pixels; name at most {MAX_PIXELS}{way}"))
 }
 
-/// Checks every entry of a list of robots, and says which robot a refusal is about.
+/// Checks every entry of a list of robots. Errors name the robot.
 pub fn each<T>(
     entries: &[T],
     robot: impl Fn(&T) -> &str,
@@ -115,12 +115,12 @@ pub fn each<T>(
         .try_for_each(|entry| check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry))))
 }
 
-/// Returns the number of control steps of commands with a row each.
+/// Returns the number of control steps of a command with one row per step.
 pub fn row_steps(rows: Option<&Vec<Vec<f64>>>) -> u32 {
     u32::try_from(rows.map_or(0, Vec::len)).unwrap_or(u32::MAX)
 }
 
-/// Checks that every robot has rows, and as many as the first one.
+/// Checks that every robot has at least one row, and as many rows as the first robot.
 pub fn equal_rows<'a>(robots: impl Iterator<Item = (&'a str, &'a Vec<Vec<f64>>)>) -> Result<(), String> {
     let counts: Vec<(&str, usize)> = robots.map(|(robot, rows)| (robot, rows.len())).collect();
     let Some((first, count)) = counts.first() else { return Ok(()) };

@@ -1,14 +1,14 @@
-//! Errors of a call that are found without a world.
+//! Errors of a call that are detected without a world.
 
 use serde_json::Value;
 
 use crate::refusal::{Refusal, RefusalClass};
 
-/// A call that does not fit the contract. The text says which call would work, because its reader is often a
-/// language model.
+/// A call that violates the contract. The text states a valid call, because its reader is often a language
+/// model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecError {
-    /// The name is not one of the tools that act on an episode.
+    /// No tool that acts on an episode has this name.
     #[error("no tool {name:?}; have: {}", .have.join(", "))]
     UnknownTool {
         /// The requested name.
@@ -16,12 +16,12 @@ pub enum SpecError {
         /// All valid names.
         have: Vec<&'static str>,
     },
-    /// The arguments do not have the tool's fields and types.
+    /// The arguments do not match the tool's fields and types.
     #[error("{tool}: {place}{reason}; arguments that work: {example}")]
     Malformed {
         /// The tool that was called.
         tool: &'static str,
-        /// Place in the arguments, for example `robots[0].steps: `; empty for the whole.
+        /// Place in the arguments, for example `robots[0].steps: `; empty for the arguments as a whole.
         place: String,
         /// Mismatch at that place.
         reason: String,
@@ -33,14 +33,14 @@ pub enum SpecError {
     Invalid {
         /// The tool that was called.
         tool: &'static str,
-        /// Mistake, its place, and a correct call.
+        /// The mistake, its place, and a valid call.
         reason: String,
     },
 }
 
 impl SpecError {
-    /// Returns the error for a caller that names the episode among the arguments. Its example then does so,
-    /// too.
+    /// Returns the error for a caller that names the episode among the arguments. The example then also
+    /// contains the episode.
     pub fn naming_episode(mut self, id: &str) -> SpecError {
         if let SpecError::Malformed { example, .. } = &mut self
             && let Ok(Value::Object(arguments)) = serde_json::from_str(example)
@@ -51,7 +51,7 @@ impl SpecError {
         self
     }
 
-    /// Returns the refusal that the caller reads.
+    /// Returns the refusal for the caller.
     pub const fn refusal(&self) -> Refusal {
         match self {
             SpecError::UnknownTool { .. } => {

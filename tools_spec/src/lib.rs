@@ -1,11 +1,11 @@
 //! The wire contract: every tool that a policy can call, with its arguments, its reply and its JSON Schema.
 //!
-//! The doc comments of the argument types are the text that a language model reads, so they state units,
-//! frames and effects. Nothing here depends on the simulator: [`Call::parse`] makes the checks that need no
+//! The doc comments of the argument types are texts that a language model reads, so they state units, frames
+//! and effects. The crate does not depend on the simulator: [`Call::parse`] performs only checks that need no
 //! world.
 //!
-//! To add a tool: one file in `tools/` and its line in `list.rs`. Code that does not handle it yet does not
-//! compile.
+//! To add a tool, add one file in `tools/` and its line in `list.rs`. Code that does not handle the tool yet
+//! fails to compile.
 
 #![warn(missing_docs)]
 
@@ -42,8 +42,8 @@ pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 
-/// Returns the REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for
-/// a caller who may or may not `talk`.
+/// Returns the REST interface of `version` as OpenAPI 3.1, generated from the types that read and write it.
+/// `talk` is true for a caller that may talk.
 pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_json::Value {
     let wording = wording.into();
     let specs: Vec<ToolSpec> = call::specs_for_programs(wording)
@@ -54,8 +54,8 @@ pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_
     schema::openapi(version, &specs)
 }
 
-/// Returns the tools of the running episode `id` with these `robots`, whose commands may have up to
-/// `most_steps` control steps, for a caller who may or may not `talk`.
+/// Returns the tools of the running episode `id` with these `robots`. Commands may have up to `most_steps`
+/// control steps. `talk` is true for a caller that may talk.
 pub fn episode_tool_specs(
     wording: impl Into<Wording>,
     id: &str,

@@ -1,37 +1,36 @@
-//! Limits of [`crate::checks`] as JSON Schema, so that a caller that keeps to the schema is not refused for
-//! them.
+//! Limits of [`crate::checks`] as JSON Schema, so that calls that conform to the schema pass these checks.
 
 use serde_json::{Value, json};
 
-/// Maximum absolute value of a number of the contract. Sensible values in metres, radians or metres per
-/// second are far smaller; larger ones would overflow the single precision of the physics.
+/// Maximum absolute value of a number in the contract. Sensible values in metres, radians or metres per
+/// second are far smaller; larger values would overflow the single precision of the physics.
 pub const LARGEST: f64 = 1e6;
 
-/// Minimum of the largest component of a quaternion. With less it has no direction.
+/// Minimum of the largest absolute component of a quaternion. Below it, the quaternion has no direction.
 pub const SMALLEST_COMPONENT: f64 = 1e-6;
 
 /// Maximum number of control steps of one command under any protocol.
 pub const MAX_STEPS: u32 = 50;
 
-/// Maximum number of pixels of one call.
+/// Maximum number of pixels in one call.
 pub const MAX_PIXELS: usize = 4096;
 
-/// Names of robots, of which an episode has the first two or three.
+/// Names of robots. An episode has the first two or three.
 pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
 
-/// The names as a pattern.
+/// Regular expression for the names of robots.
 pub const ROBOT_PATTERN: &str = "^[ABC]$";
 
 /// Image size of head cameras in pixels: columns and rows.
 const PICTURE_PX: [u32; 2] = [320, 240];
 
-/// Returns `contains` of a quaternion: it has a direction.
+/// Returns `contains` for a quaternion, which requires a direction.
 pub fn direction() -> Value {
     json!({ "anyOf": [{ "minimum": SMALLEST_COMPONENT }, { "maximum": -SMALLEST_COMPONENT }] })
 }
 
-/// Returns `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but
-/// readers of older drafts take the `contains` beside it for a demand.)
+/// Returns `not` for a list with an entry per robot: a robot is named twice. (`maxContains` would be shorter,
+/// but readers of older drafts interpret the `contains` beside it as a requirement.)
 pub fn a_robot_twice() -> Value {
     let twice = |name: &str, first: usize, second: usize| {
         let mut entries = vec![json!({}); second + 1];
@@ -45,32 +44,32 @@ pub fn a_robot_twice() -> Value {
     json!({ "anyOf": all.collect::<Vec<_>>() })
 }
 
-/// Returns `items` of a list of pixels.
+/// Returns `items` for a list of pixels.
 pub fn pixel() -> Value {
     json!({
         "type": "array", "prefixItems": pixel_range(), "items": { "type": "integer" }, "minItems": 2, "maxItems": 2,
     })
 }
 
-/// Returns `prefixItems` of a pixel.
+/// Returns `prefixItems` for a pixel.
 pub fn pixel_range() -> Value {
     json!(PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 })))
 }
 
-/// Returns `oneOf` of an object that has one of these fields, each given with the type that it has where it
-/// is not null.
+/// Returns `oneOf` for an object that has exactly one of these fields. Each field is given with its type when
+/// it is not null.
 pub fn one_of(fields: &[(&str, &str)]) -> Value {
     fields.iter().map(|(field, kind)| has(field, kind)).collect()
 }
 
-/// Returns `allOf` of an object in which at least one of these fields is given, each a list.
+/// Returns `allOf` for an object with at least one of these fields, each of which is a list.
 pub fn at_least_one(fields: &[&str]) -> Value {
     let given: Vec<Value> = fields.iter().map(|field| has(field, "array")).collect();
     json!([{ "anyOf": given }])
 }
 
-/// Returns `not` of an object of whose fields only one is given, each with the type that it has where it is
-/// not null.
+/// Returns `not` for an object that must not have all of these fields. Each field is given with its type when
+/// it is not null.
 pub fn all_of(fields: &[(&str, &str)]) -> Value {
     let given: Vec<Value> = fields.iter().map(|(field, kind)| has(field, kind)).collect();
     json!({ "allOf": given })
@@ -80,8 +79,8 @@ fn has(field: &str, kind: &str) -> Value {
     json!({ "required": [field], "properties": { field: { "type": kind } } })
 }
 
-/// Limits the number of control steps of a command at each mark `most_steps`: as `maximum`, as `maxItems`, or
-/// as `equal_rows`. The last is a list with an entry per robot, which all have equally many rows.
+/// Limits the number of control steps of commands at each mark `most_steps`: as `maximum`, `maxItems` or
+/// `equal_rows`. `equal_rows` is for a list with an entry per robot, all with the same number of rows.
 pub fn bound_steps(schema: &mut Value, most_steps: u32) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_steps(item, most_steps)),
@@ -106,7 +105,7 @@ fn equal_rows(most_steps: u32) -> Value {
     (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
-/// Restricts names of robots to `robots`, and lists with an entry per robot to their number.
+/// Restricts names of robots to `robots`, and lists with an entry per robot to the number of robots.
 pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_robots(item, robots)),
@@ -123,7 +122,7 @@ pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     }
 }
 
-/// Bounds every number of a schema that has no bound of its own. Integers stay unchanged, because their types
+/// Bounds every number in a schema that has no bound yet. Integers remain unchanged, because their types
 /// bound them.
 pub fn bound_numbers(schema: &mut Value) {
     match schema {

@@ -9,8 +9,8 @@ use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
 
-/// Generates all code that depends on every tool. A tool is one line with the type of its arguments, in the
-/// group of its kind:
+/// Generates all code that depends on the set of tools. A tool is one line with the type of its arguments, in
+/// the group of its kind:
 ///
 /// ```text
 /// /// A question about the state of things.
@@ -19,14 +19,15 @@ use crate::tools::*;
 /// }
 /// ```
 ///
-/// That line adds `query_depth` to the names and to the specifications; the variants `LookCall::QueryDepth`,
-/// with the arguments, and `LookReply::QueryDepth`, with the tool's own `Tool::Reply`; a `From<QueryDepth>`
-/// for `ToolCall`; and its arms where calls are read, named, checked and asked for their robots and steps,
-/// and where replies are read. Code that answers `LookCall`s does not compile until it handles this one.
+/// The line adds `query_depth` to the names and the specifications. It adds the variants
+/// `LookCall::QueryDepth` with the arguments, and `LookReply::QueryDepth` with the tool's `Tool::Reply`. It
+/// adds a `From<QueryDepth>` for `ToolCall`, and match arms that parse, name and check calls, return their
+/// robots and steps, and parse replies. Code that answers `LookCall`s does not compile until it handles the
+/// tool.
 ///
-/// In a group with `-> each R`, `R` is generated here and every tool has a reply of its own; with `-> all R`,
+/// In a group with `-> each R`, `R` is generated here and every tool has a separate reply. With `-> all R`,
 /// every tool of the group replies with the existing type `R`. A group `for operators` is offered only in
-/// episodes whose operators may talk. The tools in `without_episode` have no call on an episode.
+/// episodes whose operators may talk. Tools in `without_episode` have no call on an episode.
 macro_rules! tools {
     (
         without_episode { $($free:ident,)* }
@@ -35,7 +36,7 @@ macro_rules! tools {
             $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
         )*
     ) => {
-        /// Returns the tools that every language model is offered, in their order, with the texts that it
+        /// Returns the tools that every language model is offered, in order, with the texts that the model
         /// reads.
         pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
@@ -43,7 +44,8 @@ macro_rules! tools {
             specs.filter(|spec| !spec.for_operators).collect()
         }
 
-        /// Returns the tools of an operator that may talk: those of every policy, and those for talking.
+        /// Returns the tools of an operator that may talk: the tools of every policy, and the tools for
+        /// talking.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
             let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_programs);
@@ -58,7 +60,7 @@ macro_rules! tools {
             ]
         }
 
-        /// Returns every tool with its arguments and its reply as named types.
+        /// Returns every tool, with its arguments and its reply as named types.
         pub fn typed_tools() -> TypedTools {
             let mut tools = TypedToolsCollector::new();
             $( tools.add::<$free>(false, false); )*
@@ -67,7 +69,7 @@ macro_rules! tools {
             tools.finish()
         }
 
-        /// The tools that act on an episode, by name.
+        /// The names of the tools that act on an episode.
         pub const EPISODE_TOOLS: &[&str] = &[$( $( $tool::NAME, )* )*];
 
         $(
@@ -80,9 +82,9 @@ macro_rules! tools {
             }
 
             impl $call {
-                /// The tools of this group, by name.
+                /// The names of this group's tools.
                 pub const TOOLS: &[&str] = &[$( $tool::NAME, )*];
-                /// True if only operators that may talk are offered them.
+                /// True if these tools are offered only to operators that may talk.
                 pub const FOR_OPERATORS: bool = tools!(@for_operators $($audience)?);
 
                 /// Returns the tool's name.
@@ -99,7 +101,7 @@ macro_rules! tools {
                     }
                 }
 
-                /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
+                /// Returns the number of requested control steps of 20 ms; 0 if the call is not a command.
                 pub fn steps(&self) -> u32 {
                     match self {
                         $( $call::$tool(args) => args.steps(), )*
@@ -110,7 +112,7 @@ macro_rules! tools {
             tools!(@replies $whose $reply $call { $($tool)* });
         )*
 
-        /// A call on an episode, parsed, and checked as far as possible without a world. It serialises to its
+        /// A call on an episode, parsed and checked as far as possible without a world. It serializes to its
         /// arguments.
         #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(untagged)]
@@ -167,15 +169,14 @@ macro_rules! tools {
                 }
             }
 
-            /// Returns the number of requested control steps of 20 ms; 0 if it is no command.
+            /// Returns the number of requested control steps of 20 ms; 0 if the call is not a command.
             pub fn steps(&self) -> u32 {
                 match self {
                     $( ToolCall::$group(call) => call.steps(), )*
                 }
             }
 
-            /// Checks a call that was built in Rust rather than read from JSON; [`ToolCall::parse`] has
-            /// already done it.
+            /// Checks a call that was built in Rust. [`ToolCall::parse`] has already checked calls from JSON.
             pub fn validate(&self) -> Result<(), SpecError> {
                 let checked = match self {
                     $( $( ToolCall::$group($call::$tool(args)) => args.validate(), )* )*
@@ -183,7 +184,7 @@ macro_rules! tools {
                 checked.map_err(|reason| SpecError::Invalid { tool: self.name(), reason })
             }
 
-            /// Reads the reply to this call, for clients written in Rust.
+            /// Parses the reply to this call, for clients written in Rust.
             pub fn parse_reply(&self, reply: Value) -> Result<ToolReply, serde_json::Error> {
                 match self {
                     $( $(
@@ -222,7 +223,7 @@ tools! {
         StartEpisode,
     }
 
-    /// A question about the state of things. It changes nothing and costs no steps.
+    /// A question about the state of the world. It changes nothing and costs no steps.
     Look(LookCall) -> each LookReply {
         Observe,
         GetRobotState,
@@ -230,7 +231,7 @@ tools! {
         CheckReach,
     }
 
-    /// A command to the robots. Physics moves on by its steps.
+    /// A command to the robots. It advances physics by its steps.
     Act(ActCall) -> all CommandReply {
         MoveWrists,
         Walk,
@@ -239,19 +240,19 @@ tools! {
         Wait,
     }
 
-    /// Several commands by one call.
+    /// Several commands in one call.
     Plan(PlanCall) -> all PlanReply {
         SendPlan,
         WalkTo,
     }
 
-    /// A call about the episode as a whole, which is answered after its end, too.
+    /// A call about the episode as a whole, which is also answered after the episode's end.
     Manage(ManageCall) -> each ManageReply {
         GetStatus,
         Finish,
     }
 
-    /// A message from one operator to the others.
+    /// A message from one operator to the other operators.
     Talk(TalkCall) -> each TalkReply for operators {
         Say,
     }

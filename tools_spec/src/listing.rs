@@ -1,4 +1,4 @@
-//! The episodes that a server holds, as it lists them.
+//! The episodes of a server, as it lists them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,18 +6,17 @@ use serde::{Deserialize, Serialize};
 use crate::parts::{Operators, Protocol};
 use crate::tools::EndReason;
 
-/// The episodes that the caller may know of, by id: for who started them all that the server holds, for the
-/// operator of a robot its own.
+/// The episodes that the caller may see, by id: all of the server's, or for the operator of a robot its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EpisodeList {
     /// The episodes.
     pub episodes: Vec<EpisodeEntry>,
 }
 
-/// One episode, as its last call has left it.
+/// One episode after its last call.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EpisodeEntry {
-    /// The handle that every tool needs.
+    /// Handle that every tool needs.
     pub episode_id: String,
     /// The task's id.
     pub task: String,
@@ -26,10 +25,10 @@ pub struct EpisodeEntry {
     pub seed: Option<u32>,
     /// The rules in force.
     pub protocol: Protocol,
-    /// True where each robot has an operator of its own.
+    /// One operator for all robots, or one each.
     pub operators: Operators,
     /// Control steps executed up to now, the initial hold included.
     pub step: u32,
-    /// Why the episode has ended; null while it goes on.
+    /// Cause of the end; null while the episode runs.
     pub ended: Option<EndReason>,
 }

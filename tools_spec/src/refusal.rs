@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// An error as its caller reads it. Each error enum gives one for every variant; its text is the error's own.
+/// An error for its caller. Each error enum provides a refusal for every variant; its text is the error's
+/// text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refusal {
     /// A stable name for the kind of problem, for example `unknown-robot`.
@@ -13,9 +14,9 @@ pub struct Refusal {
     pub title: &'static str,
     /// General kind, which a protocol maps to its own codes.
     pub class: RefusalClass,
-    /// Seconds after which the same request may work; without, it will be refused again.
+    /// Seconds after which the same request may work; `None` if it would be refused again.
     pub retry_after_s: Option<u16>,
-    /// Remedy, where the error's own text does not say it.
+    /// Remedy, if the error's text does not state it.
     pub hint: Option<&'static str>,
 }
 
@@ -24,23 +25,23 @@ pub struct Refusal {
 pub enum RefusalClass {
     /// The request names something that does not exist.
     NotFound,
-    /// The request can be read, but can never work.
+    /// The request can be parsed but is never valid.
     Invalid,
-    /// The request does not fit the present state.
+    /// The request conflicts with the present state.
     Conflict,
     /// The caller may not do this.
     Forbidden,
     /// The request names an object that no longer exists.
     Gone,
-    /// Another server has the object of the request.
+    /// The object of the request is on another server.
     Elsewhere,
-    /// The caller asks for more than there is room for.
+    /// The caller requests more than the server has room for.
     TooMany,
-    /// The server takes no requests of this kind at present.
+    /// The server accepts no requests of this kind at present.
     Unavailable,
-    /// The simulator failed, which the caller has to know.
+    /// The simulator failed, and the caller must be informed.
     Failed,
-    /// A fault of the server, whose text is for its log only.
+    /// A fault of the server, whose text is only for the server's log.
     Internal,
 }
 
@@ -48,7 +49,7 @@ impl Refusal {
     /// A fault of the server.
     pub const INTERNAL: Refusal = Refusal::new("internal", "Internal error", RefusalClass::Internal);
 
-    /// Returns a permanent refusal. The error's text says which call would work.
+    /// Returns a permanent refusal. The error's text states a valid call.
     pub const fn new(kind: &'static str, title: &'static str, class: RefusalClass) -> Refusal {
         Refusal { kind, title, class, retry_after_s: None, hint: None }
     }
@@ -74,13 +75,12 @@ pub struct ProblemBody {
     pub title: String,
     /// The HTTP status.
     pub status: u16,
-    /// Mistake of this call, and a call that would work.
+    /// Mistake in this call, and a valid call.
     pub detail: String,
-    /// Why the recording of the episode is not complete; left out where it is.
+    /// Cause of an incomplete recording; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
-    /// Result of the episode, as finish returns it, where it is refused because it has ended; left out
-    /// otherwise.
+    /// Result of the episode, as from finish, if its end is the cause of the refusal; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result: Option<Value>,
 }

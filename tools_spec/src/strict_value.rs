@@ -1,15 +1,15 @@
-//! JSON as JSON Schema understands it, which is not quite as serde does: an array is no object, and `1.0`
-//! is an integer.
+//! JSON interpreted like JSON Schema, which differs from serde: an array is not an object, and `1.0` is an
+//! integer.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
 use serde::forward_to_deserialize_any;
 use serde_json::{Error, Value};
 
-/// The largest integer below which a double names every integer.
+/// Largest number up to which a double represents every integer.
 const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// Arguments to be deserialised into a type.
+/// Arguments to be deserialized into a type.
 pub struct StrictValue(pub Value);
 
 impl<'de> IntoDeserializer<'de, Error> for StrictValue {
@@ -20,7 +20,7 @@ impl<'de> IntoDeserializer<'de, Error> for StrictValue {
     }
 }
 
-/// Returns the integer that a number without a fraction is.
+/// Converts a number without a fraction to an integer.
 fn integer(value: Value) -> Value {
     match value.as_f64() {
         Some(number) if value.is_f64() && number.fract() == 0.0 && number.abs() <= LARGEST_EXACT => {
@@ -69,7 +69,7 @@ impl<'de> Deserializer<'de> for StrictValue {
         visitor: V,
     ) -> Result<V::Value, Error> {
         match self.0 {
-            // Serde would take the items for the fields, in their order.
+            // Serde would interpret the items as the fields, in order.
             Value::Array(_) => Err(Error::invalid_type(Unexpected::Seq, &"an object")),
             Value::Null => Err(Error::invalid_type(Unexpected::Unit, &"an object")),
             _ => self.deserialize_any(visitor),

@@ -1,4 +1,4 @@
-//! The trait of tools, and how their arguments are read from JSON.
+//! The trait of tools, and parsing of their arguments from JSON.
 
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
@@ -23,58 +23,58 @@ impl Route {
     }
 }
 
-/// The arguments of one tool. The type's doc comment is the tool's description; hints on grasping are
-/// separate from it, for policies with full assistance.
+/// The arguments of one tool. The type's doc comment is the tool's description. Hints on grasping are
+/// separate, for policies with full assistance.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
-    /// Type of its reply.
+    /// Type of the reply.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
-    /// The name a caller uses.
+    /// Name that callers use.
     const NAME: &'static str;
-    /// True if the call leaves the world exactly as it was and costs no steps.
+    /// True if the call leaves the world exactly unchanged and costs no steps.
     const READ_ONLY: bool;
-    /// True if calling it again with the same arguments changes nothing more.
+    /// True if a repeated call with the same arguments changes nothing further.
     const IDEMPOTENT: bool = Self::READ_ONLY;
 
-    /// True if its schema can be strict: it names every field, and allows no others.
+    /// True if the schema can be strict: it names every field, and allows no others.
     const STRICT: bool = true;
-    /// True if only policies with full assistance are offered it.
+    /// True if the tool is offered only to policies with full assistance.
     const FULL_ONLY: bool = false;
-    /// True if it is for programs: language models are not offered it.
+    /// True if the tool is for programs and is not offered to language models.
     const FOR_PROGRAMS: bool = false;
 
-    /// Returns valid arguments, shown to callers after a refusal.
+    /// Returns valid arguments, which callers see after a refusal.
     fn example() -> Self;
 
-    /// Returns the robots that the arguments name, each as often as they name it.
+    /// Returns the robots that the arguments name, including repetitions.
     fn robots(&self) -> Vec<&str> {
         Vec::new()
     }
 
-    /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
+    /// Returns the number of requested control steps of 20 ms; 0 if the tool is not a command.
     fn steps(&self) -> u32 {
         0
     }
 
-    /// Returns its REST route.
+    /// Returns the REST route of the tool.
     fn route() -> Route {
         Route::of_episode("{episode_id}", Self::NAME)
     }
 
-    /// Checks properties that need no world: lengths, finite numbers, quaternions that have a direction. The
-    /// text says which values would work.
+    /// Checks properties that need no world: lengths, finite numbers, and directions of quaternions. Errors
+    /// state valid values.
     fn validate(&self) -> Result<(), String> {
         Ok(())
     }
 }
 
-/// Reads and checks the arguments of `T`, which have to be an object.
+/// Parses and checks the arguments of `T`, which must be an object.
 pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
     let parsed: T = read_as(T::NAME, args, || json!(T::example()))?;
     parsed.validate().map_err(|reason| SpecError::Invalid { tool: T::NAME, reason })?;
     Ok(parsed)
 }
 
-/// Parses a value that refusals call `name`; `example` is a valid one.
+/// Parses a value that refusals call `name`. `example` returns a valid value.
 pub fn read_as<T: DeserializeOwned>(
     name: &'static str,
     value: Value,
@@ -91,7 +91,7 @@ pub fn read_as<T: DeserializeOwned>(
     })
 }
 
-/// Removes the fields that are null. Nullable fields are optional, and not every form of the contract has
+/// Removes the fields that are null. Nullable fields are optional, and some forms of the contract have no
 /// null.
 fn without_nulls(value: Value) -> Value {
     match value {
@@ -104,7 +104,7 @@ fn without_nulls(value: Value) -> Value {
     }
 }
 
-/// Replaces the names of Rust's types in an error of serde by plain words.
+/// Replaces the names of Rust types in a serde error by plain words.
 fn in_plain_words(reason: &str) -> String {
     reason.replace("expected u32", "expected a whole number from 0 to 4294967295")
 }

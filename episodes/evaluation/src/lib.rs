@@ -1,4 +1,4 @@
-//! Evaluation: many episodes that policies play, reports of the results, and tools for tasks and training.
+//! Evaluation: policies that play many episodes, reports of the results, and tools for tasks and training.
 //! Sessions and recordings do not depend on this crate.
 
 pub mod batch;

@@ -1,11 +1,11 @@
-//! Uncertainty of counts of episodes: exact and score intervals of rates and of means of rates. There are
-//! also intervals of the difference between two policies on the same episodes.
+//! Uncertainty of episode counts: exact and score intervals of rates and of means of rates, and intervals of
+//! the difference between two policies on the same episodes.
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 
-/// Half of the probability outside an interval of 95 %.
+/// Probability on each side of a 95 % interval.
 const TAIL: f64 = 0.025;
-/// Quantile of the normal distribution that is exceeded with that probability.
+/// Quantile of the normal distribution that is exceeded with the probability `TAIL`.
 const Z: f64 = 1.959_963_984_540_054;
 
 /// Number of successes among trials.
@@ -22,7 +22,7 @@ impl Count {
     }
 }
 
-/// Returns the exact 95 % interval of a rate (Clopper and Pearson, 1934): the limits are quantiles of beta
+/// Returns the exact 95 % interval of a rate (Clopper and Pearson, 1934). Its limits are quantiles of beta
 /// distributions.
 pub fn clopper_pearson(count: Count) -> [f64; 2] {
     let (k, n) = (count.successes as f64, count.trials as f64);
@@ -41,9 +41,8 @@ pub fn wilson(count: Count) -> [f64; 2] {
     [-1.0, 1.0].map(|sign| ((middle + sign * reach) / (1.0 + Z * Z / n)).clamp(0.0, 1.0))
 }
 
-/// Returns the mean of rates that each count the same, and its interval (Zou and Donner, 2008). The
-/// distances of the exact limits from their own rates are added as squares. Returns `None` without any
-/// trials.
+/// Returns the mean of rates with equal weights, and its interval (Zou and Donner, 2008). The distances of
+/// the exact limits from their rates are added in quadrature. Returns `None` without trials.
 pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     let known: Vec<(f64, [f64; 2])> =
         counts.iter().filter_map(|count| Some((count.share()?, clopper_pearson(*count)))).collect();
@@ -83,8 +82,8 @@ impl Pairs {
     }
 }
 
-/// Returns the two-sided exact p-value of equal success (McNemar, 1947). It is the probability of so uneven
-/// a split, or a more uneven one, among the episodes in which only one policy succeeds.
+/// Returns the two-sided exact p-value of equal success (McNemar, 1947). It is the probability of a split at
+/// least as uneven among the episodes in which only one policy succeeds.
 pub fn mcnemar(pairs: Pairs) -> f64 {
     let (fewer, discordant) = (pairs.first_only.min(pairs.second_only), pairs.first_only + pairs.second_only);
     let tail = Binomial::new(0.5, discordant as u64).map_or(1.0, |split| split.cdf(fewer as u64));

@@ -1,4 +1,4 @@
-//! Draft of a task in an existing scene: its movable bodies, a place for two robots, and a first phase.
+//! Draft of a task in an existing scene: its movable bodies, places for two robots, and a first phase.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,17 +10,18 @@ use tandem_sim::{
     WorldSpec, assets,
 };
 
-/// Length of a trial. It is longer than any fall from a table.
+/// Length of a trial in control steps. It is longer than any fall from a table.
 const TRIAL_STEPS: u32 = 100;
-/// Duration of a trial of a robot's place. Overlapping bodies separate within this time.
+/// Duration of a trial of a robot's place, in control steps. Overlapping bodies separate within this time.
 const PLACE_STEPS: u32 = 15;
 /// Distance within which an object counts as staying in place.
 const STAYS_M: f32 = 0.03;
-/// Height below which robots stand on the floor.
+/// Height up to which contacts are those of feet on the floor.
 const FEET_M: f32 = 0.08;
-/// Maximum mass of a body that robots are asked to lift.
+/// Maximum mass of a body that a draft asks robots to lift.
 const MAX_LIFTED_KG: f32 = 4.0;
-/// Distances and headings from a body at which a robot is tried, and its least distance from the other.
+/// Distances from a body and number of headings at which a robot's place is tried, and the minimum distance
+/// between the robots.
 const DISTANCES_M: [f32; 5] = [0.4, 0.5, 0.65, 0.85, 1.1];
 const HEADINGS: u16 = 16;
 const ROBOTS_APART_M: f32 = 0.6;
@@ -32,7 +33,7 @@ pub struct TaskDraft {
     pub bodies: Vec<String>,
     /// The task's file.
     pub text: String,
-    /// Decisions that are left to its author, a line each.
+    /// Decisions that the task's author still has to make, a line each.
     pub notes: Vec<String>,
 }
 
@@ -47,19 +48,19 @@ pub enum TaskDraftError {
     NothingMoves { scene: String, have: String },
 }
 
-/// A body of the scene as the draft describes it.
+/// A body of the scene, with the properties that the draft describes.
 struct Listed {
     name: String,
     kind: String,
     mass_kg: f32,
     size_m: Vector,
     middle_m: Vector,
-    /// Condition of a phase about it; `None` if it is no object of the draft.
+    /// Condition of a phase about the body; `None` if the draft does not use it as an object.
     done: Option<String>,
     stays: bool,
 }
 
-/// Drafts a task with the name `id` in the scene of a file, which the task's file calls `scene_name`.
+/// Drafts a task with the id `id` in the scene of a file, to which the task's file refers as `scene_name`.
 ///
 /// # Errors
 ///
@@ -86,7 +87,7 @@ pub fn draft_task(scene: &Path, scene_name: &str, id: &str) -> Result<TaskDraft,
 
 const FREE: &str = "free";
 
-/// Returns the movable bodies of a scene, after a trial of whether they stay where they are.
+/// Returns the movable bodies of a scene. A trial determines whether each stays in place.
 fn listed(document: &Arc<Document>) -> Result<Vec<Listed>, SimError> {
     let mut world = World::new(&spec(document, Vec::new()))?;
     let start = world.present();
@@ -141,7 +142,7 @@ fn kind(body: &SceneBody) -> String {
     }
 }
 
-/// Returns a condition that a door or a drawer is open by half of its range.
+/// Returns the condition that a door or a drawer is open by half of its range.
 fn opened(body: &SceneBody) -> Option<String> {
     let name = &body.link.name;
     let half = |joint: &AxisJoint| {
@@ -179,7 +180,7 @@ fn spec(document: &Arc<Document>, robots: Vec<RobotPlacement>) -> WorldSpec {
     WorldSpec { scene, robots, objects: Vec::new() }
 }
 
-/// Returns places for two robots that look at a point, or as many as there is floor for.
+/// Returns places for two robots that face a point, or fewer if there is not enough floor.
 fn places(document: &Arc<Document>, around_m: Vector) -> Result<Vec<RobotPlacement>, SimError> {
     let model = Arc::new(RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT)?)?);
     let mut found: Vec<RobotPlacement> = Vec::new();
@@ -203,7 +204,7 @@ fn places(document: &Arc<Document>, around_m: Vector) -> Result<Vec<RobotPlaceme
     Ok(found)
 }
 
-/// Yields the places at which a robot is tried, the nearest first.
+/// Yields the places to try for a robot, the nearest first.
 fn tried(name: &'static str, around_m: Vector) -> impl Iterator<Item = RobotPlacement> {
     DISTANCES_M.into_iter().flat_map(move |distance_m| {
         (0..HEADINGS).map(move |heading| {
@@ -219,7 +220,7 @@ fn tried(name: &'static str, around_m: Vector) -> impl Iterator<Item = RobotPlac
     })
 }
 
-/// Returns true if the last of these robots stands and touches only the floor.
+/// Returns `true` if the last of these robots stands and only its feet touch anything.
 fn stands(
     document: &Arc<Document>,
     model: &Arc<RobotModel>,

@@ -18,8 +18,8 @@ use crate::protocol::Rules;
 pub enum Called {
     /// One call, by the policy of all robots or an operator of one.
     One(Call),
-    /// Commands of several operators, executed at the same time for the duration of the shortest. Robots
-    /// without a command hold still.
+    /// Commands of several operators, executed at the same time for the duration of the shortest command.
+    /// Robots without a command hold still.
     Together(Vec<OperatorCall>),
 }
 
@@ -32,14 +32,14 @@ pub struct OperatorCall {
     planned: Option<&'static str>,
 }
 
-/// A command of an operator that the episode has read, to be executed together with those of others.
+/// An operator's command that has been read, to be executed together with the other operators' commands.
 #[derive(Clone, Debug)]
 pub struct OperatorCommand {
     /// The call in the recording's form.
     pub(crate) call: OperatorCall,
     /// Number of control steps requested.
     pub(crate) steps: u32,
-    /// Requests and thinking time of its operator up to now, as the host counts them.
+    /// Requests and thinking time of its operator so far, as counted by the host.
     pub(crate) used: Option<OperatorUse>,
 }
 
@@ -104,7 +104,7 @@ impl Called {
     ///
     /// # Errors
     ///
-    /// The first refusal.
+    /// If a call does not fit the contract or `check` refuses it. The first such error is returned.
     pub(crate) fn allowed(
         &self,
         check: impl Fn(&ToolCall) -> Result<(), EpisodeError>,
@@ -124,7 +124,7 @@ impl Called {
         }
     }
 
-    /// Returns true if every command is one of a plan, which has been counted as a request already.
+    /// Returns true if every command belongs to a plan, which has been counted as a request already.
     pub(crate) fn continues_plans(&self) -> bool {
         match self {
             Called::One(_) => false,
@@ -196,8 +196,8 @@ impl From<Call> for Called {
 }
 
 impl OperatorCall {
-    /// Returns the call for the operator of `robot`. An observation that names no robot is one of the
-    /// operator's own.
+    /// Returns the call for the operator of `robot`. An observation that names no robot is of the operator's
+    /// robot.
     ///
     /// # Errors
     ///
@@ -211,12 +211,12 @@ impl OperatorCall {
         Ok(OperatorCall { robot: robot.into(), call, planned: None })
     }
 
-    /// Returns the call as a part of a plan's command, which has the tool `tool`.
+    /// Returns the call as part of a plan's command, which has the tool `tool`.
     pub fn planned(self, tool: &'static str) -> OperatorCall {
         OperatorCall { planned: Some(tool), ..self }
     }
 
-    /// Returns the name of the tool; of a part of a plan, that of the plan's command.
+    /// Returns the tool's name. For a part of a plan, returns the name of the tool of the plan's command.
     pub fn tool(&self) -> &'static str {
         self.planned.unwrap_or(self.call.name())
     }
@@ -236,7 +236,7 @@ impl OperatorCall {
         self.call
     }
 
-    /// Returns the command without the observation afterwards.
+    /// Returns the command without the observation requested after it.
     pub fn unseen(mut self) -> OperatorCall {
         self.call.then = None;
         self
@@ -314,7 +314,7 @@ impl OperatorCall {
 }
 
 impl OperatorCommand {
-    /// Sets the amounts that its operator has used up to now.
+    /// Adds the operator's requests and thinking time so far.
     pub fn with_use(self, used: OperatorUse) -> OperatorCommand {
         OperatorCommand { used: Some(used), ..self }
     }
@@ -329,7 +329,7 @@ impl OperatorCommand {
         self.steps
     }
 
-    /// Returns the name of the tool; of a part of a plan, that of the plan's command.
+    /// Returns the tool's name. For a part of a plan, returns the name of the tool of the plan's command.
     pub fn tool(&self) -> &'static str {
         self.call.tool()
     }

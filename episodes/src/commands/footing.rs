@@ -8,11 +8,11 @@ use tandem_tools_spec::{BaseReport, BaseState};
 
 use crate::convert::{coarse, isometry_from_sim};
 
-/// Control steps in which a robot stops after a stop command, measured from 0.05 to 0.4 m/s in every
-/// direction. A robot that steps later has been pushed.
+/// Number of control steps within which a robot stops after a stop command, measured from 0.05 to 0.4 m/s in
+/// every direction. A robot that steps later has been pushed.
 const SETTLES_STEPS: u32 = 75;
-/// Maximum duration of a motion whose displacement is computed as speed times time, and maximum lag of the
-/// base behind that place.
+/// Maximum duration of a motion whose displacement is computed as speed times time, and maximum distance of
+/// the base from the place computed in this way.
 const SHORT_STEPS: u32 = 125;
 const LEASH_M: f64 = 0.25;
 /// Parameters of the coasting distance after longer walks, which grows with the speed:
@@ -22,8 +22,8 @@ const LEASH_M: f64 = 0.25;
 const COASTS_S: f64 = 0.25;
 const COASTS_S2_M: f64 = 0.6;
 const CONTROL_S: f64 = 0.02;
-/// A pelvis off its height counts as moving for this many control steps after the feet have stopped, even
-/// if it does not rise yet. Later it counts as moving only above this vertical speed.
+/// Number of control steps after the feet have stopped for which a pelvis away from its height counts as
+/// moving, even if it does not rise yet. Later it counts as moving only above this vertical speed.
 const PLANTED_STEPS: u32 = 10;
 const RISES_M_S: f64 = 0.02;
 /// Weight of one control step in the running mean of the vertical speed.
@@ -37,22 +37,22 @@ const DISPLACED_M: f64 = 0.02;
 pub struct Footing {
     pub pelvis_from_start: Isometry3<f64>,
     is_stepping: Option<bool>,
-    /// Control steps since the last command to move, and its velocity.
+    /// Control steps since the last motion command, and that command's velocity.
     still_steps: u32,
     told_m_s: [f64; 2],
-    /// Place to which the commands since the last stand lead.
+    /// Destination of the motion commands since the base last stood.
     walk: Option<ToldWalk>,
-    /// Pose at which it came to rest afterwards, in the frame of its estimate.
+    /// Pose at which the base came to rest after that walk, in the frame of its estimate.
     rests_at: Option<Isometry3<f64>>,
     /// Control steps since the feet last moved; height of the pelvis, and its recent vertical speed.
     planted_steps: u32,
     height_m: f64,
     rises_m_s: f64,
-    /// True if the base has stepped since its last command began, despite the command to stand.
+    /// True if the base has stepped since its last command began, despite a command to stand.
     stepped: bool,
 }
 
-/// Place in the start frame to which commands lead from the last stand.
+/// Destination, in the start frame, of the motion commands since the base last stood.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct ToldWalk {
     to_m: Vector3<f64>,
@@ -82,7 +82,7 @@ impl Footing {
         self.stepped = false;
     }
 
-    /// Updates the state with the robot's sensing after a control step under the command `base`.
+    /// Updates the state from the robot's sensor readings after a control step under the command `base`.
     pub fn feel(&mut self, sensed: &RobotSensed, base: &BaseCommand, world_from_pelvis: &Isometry3<f64>) {
         self.pelvis_from_start = isometry_from_sim(&sensed.start_from_pelvis).inverse();
         self.is_stepping = sensed.is_stepping;

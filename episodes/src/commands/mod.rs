@@ -1,5 +1,5 @@
-//! Commands: an acting tool call is converted to orders for robots once, and each order to a trajectory
-//! of joint targets.
+//! Commands: an acting tool call is converted once to orders for robots, and each order to a trajectory of
+//! joint targets.
 //!
 //! Each acting tool has a separate file that converts its arguments to joint targets: `move_wrists`, `walk`,
 //! `send_joint_chunk`, `send_joint_drives`, `wait`.

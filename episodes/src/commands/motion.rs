@@ -27,7 +27,7 @@ const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
-/// Length in metres that counts like a radian in the distance to a wrist's target.
+/// Distance in metres that counts as much as one radian of rotation in the distance to a wrist's target.
 const M_PER_RAD: f64 = 0.1;
 /// Weight of one control step in the running mean of the distance.
 const LATELY_PART: f64 = 0.1;
@@ -66,10 +66,11 @@ pub struct MotionState {
     pub(super) restraint: Restraint,
     /// Latest sensed pose of the pelvis.
     world_from_pelvis: Isometry3<f64>,
-    /// Latest sensed load on both hands: forces ahead and left, and moment about the midpoint's vertical.
+    /// Latest sensed load on both hands: forces forward and to the left, and moment about the vertical
+    /// through the hands' midpoint.
     pull_n: [f64; 2],
     turning_n_m: f64,
-    /// Displacement of the hands by yielding to each of these.
+    /// Displacement of the hands caused by yielding to each of these loads.
     yielded_m: [f64; 2],
     yielded_rad: f64,
     /// The solver's memory of steps that did not help; see [`Solver::caution`].
@@ -108,7 +109,7 @@ pub struct Reach {
     pub errors: Sides<Option<FrameError>>,
     /// Joints that would be at their limits.
     pub joints_at_limit: Vec<String>,
-    /// True if its joints move the robot's centre of mass beyond the limit, and farther than now.
+    /// True if the reach moves the robot's centre of mass beyond the limit, and farther than now.
     pub has_to_step: bool,
 }
 
@@ -125,7 +126,8 @@ impl Compliance {
 }
 
 impl Motion {
-    /// Returns the motion of a robot that stands under `rest`, with its pelvis at `world_from_pelvis`.
+    /// Returns the motion of a robot that stands under the command `rest`, with its pelvis at
+    /// `world_from_pelvis`.
     pub fn new(
         robot: RobotSheet,
         body: &Arc<UpperBody>,
@@ -162,7 +164,7 @@ impl Motion {
         self.state.turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
     }
 
-    /// Updates the reported state with the robot's sensing after a control step.
+    /// Updates the reported state from the robot's sensor readings after a control step.
     pub fn feel(&mut self, sensed: &RobotSensed) {
         if !self.state.setpoints.is_empty() {
             self.stay_where(sensed);
@@ -252,7 +254,7 @@ impl Motion {
         self.state = state;
     }
 
-    /// Returns the motion of an equal robot in the same state.
+    /// Returns the motion of an identical robot in the same state.
     pub fn another(&self) -> Motion {
         Motion {
             robot: self.robot.clone(),
@@ -262,7 +264,8 @@ impl Motion {
         }
     }
 
-    /// Returns the state of an equal robot after `command`; the hands' poses follow from the joint targets.
+    /// Returns the state of an identical robot after `command`; the hands' poses follow from the joint
+    /// targets.
     pub fn state_after(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
         Motion::new(self.robot.clone(), &self.body, command, world_from_pelvis).state
     }
@@ -288,7 +291,7 @@ impl Motion {
         BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
     }
 
-    /// Returns the poses of the wrists that the present aims and joint targets mean.
+    /// Returns the wrist poses that follow from the present aims and joint targets.
     pub fn wrists(&self) -> Sides<WristPoses> {
         let MotionState { aims, world_from_pelvis, .. } = &self.state;
         let commanded = self.commanded_wrists();
@@ -329,8 +332,8 @@ impl Motion {
         self.state.base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m };
     }
 
-    /// Returns the setpoints of the motors in the current control step, which replace its command; empty
-    /// without them.
+    /// Returns the motor setpoints of the current control step, which replace the robot's command. The slice
+    /// is empty without setpoints.
     pub fn setpoints(&self) -> &[MotorSetpoints] {
         &self.state.setpoints
     }
@@ -348,7 +351,7 @@ impl Motion {
         !self.state.setpoints.is_empty()
     }
 
-    /// Returns a robot with driven motors to its controller, in its present posture.
+    /// Returns control of a robot with driven motors to its controller, which keeps the present posture.
     pub(super) fn hand_back(&mut self) {
         self.state.setpoints.clear();
     }
@@ -433,7 +436,8 @@ impl Motion {
         ahead_m > STEPS_AHEAD_M && ahead_m > self.ahead_m(&self.state.upper_rad)
     }
 
-    /// Returns how far these joint targets move the whole robot's centre of mass ahead of that at rest.
+    /// Returns the forward displacement of the whole robot's centre of mass from rest under these joint
+    /// targets.
     fn ahead_m(&self, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }

@@ -1,5 +1,5 @@
-//! `move_wrists`: wrists and fingers move in a straight line and arrive at the order's last step. The
-//! line is straight in the world frame, or for carried targets in the pelvis frame.
+//! `move_wrists`: wrists and fingers move in a straight line and reach their goals at the order's last step.
+//! The line is straight in the world frame, or for carried targets in the pelvis frame.
 
 use nalgebra::{Isometry3, Translation3};
 use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};

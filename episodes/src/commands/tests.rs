@@ -72,7 +72,7 @@ fn wrist_in_world_m(motion: &Motion) -> Vector3<f64> {
     (motion.world_from_pelvis() * motion.wrists().right.commanded).translation.vector
 }
 
-/// Returns a robot whose right hand has arrived in front of its chest.
+/// Returns a robot whose right hand has reached its target in front of its chest.
 fn arrived() -> Motion {
     let mut motion = standing();
     let goal = action(right_hand(false), &motion);

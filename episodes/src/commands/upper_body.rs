@@ -72,8 +72,8 @@ impl UpperBody {
         ahead_m(robot, &self.rest_upper_rad)
     }
 
-    /// Returns the tolerance within which a wrist has arrived. With an arm of few joints, any orientation
-    /// is accepted.
+    /// Returns the tolerance within which a wrist has reached its target. For an arm of few joints, any
+    /// orientation is accepted.
     pub fn tolerance(&self, side: Side) -> Tolerance {
         match self.turns_hand[side] {
             true => REACH_TOLERANCE,

@@ -47,15 +47,15 @@ pub fn stands_released(f: &Facts, object: &str) -> Vec<String> {
     found
 }
 
-/// Returns the change of an object's height since the start.
+/// Describes the change of an object's height since the start.
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> Vec<String> {
     let lift_m = f.lift_m(object);
     let (by_m, way) = (lift_m.abs(), if lift_m > 0.0 { "higher" } else { "lower" });
     vec![format!("{object} is {by_m:.3} m {way} than at the start, at most {within_m}")]
 }
 
-/// Returns the distance between two objects along each axis on which it exceeds `half_m`. The z axis
-/// counts if `also_high` is set.
+/// Describes the distance between two objects along each axis on which it exceeds `half_m`. The z axis counts
+/// if `also_high` is set.
 pub fn apart(f: &Facts, object: &str, target: &str, half_m: f32, also_high: bool) -> Vec<String> {
     let apart_m = f.position_m(object) - f.position_m(target);
     let axes = [("x", apart_m.x), ("y", apart_m.y), ("z", if also_high { apart_m.z } else { 0.0 })];

@@ -1,4 +1,4 @@
-//! The brief: frames, cameras and hands in words, for policies. The numbers are those of the embedded robot.
+//! Brief for policies: frames, cameras and hands in words. The numbers are those of the embedded robot.
 
 use tandem_sim::render::CameraModel;
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
@@ -76,7 +76,7 @@ const LOADS: &str = " Stand with the pelvis stand_behind_m behind the places of 
     hands give way (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, \
     too, until it stands at its goal.";
 
-/// The same for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
+/// Text on carrying for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
 /// `two_robots_carry_a_basket_by_one_call` check it.
 const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m \
     with compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, \

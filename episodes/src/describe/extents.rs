@@ -14,7 +14,7 @@ pub fn extent_m(points_m: impl Iterator<Item = Vector>, yaw_rad: f32) -> [Vector
         })
 }
 
-/// Returns the corners of a geom's box, or its vertices.
+/// Returns the corners of a geom's bounding box, or its vertices, in the frame of `frame_from_body`.
 pub fn corners_m(geom: &Geom, frame_from_body: &Pose) -> Vec<Vector> {
     let pose = *frame_from_body * geom.body_from_geom;
     let of_box = |half_m: Vector| -> Vec<Vector> {

@@ -17,8 +17,8 @@ const ROUND_M: f32 = 0.005;
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
 /// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
-/// Lines for parts that move on the objects and for the furniture among the room's fixed geoms follow, and one
-/// for each partner.
+/// Lines for parts that move on the objects and for the furniture among the room's fixed geoms follow, and
+/// one for each partner.
 pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, SimError> {
     let first = &task.robots[0];
     let line = |spot: &ObjectSpot| {
@@ -90,7 +90,7 @@ fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
     high_m - low_m
 }
 
-/// Returns the lowest and highest coordinates of an object of these parts in such a frame at its origin.
+/// Returns the lowest and highest coordinates of such an object relative to its origin, along the same axes.
 fn visible_m(parts: &[ObjectPart], yaw_rad: f32) -> [Vector; 2] {
     let corners = parts.iter().flat_map(|part| {
         let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);

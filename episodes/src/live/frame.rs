@@ -57,9 +57,9 @@ pub fn row(live: &LiveStep, motions: &mut [Motion], robots: &[RobotFrame]) -> Ve
     row.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
-/// Appends the values of a hand: the wrist's pose (7), its target's pose (7), its state (1), and the
-/// errors [m, rad]. Then the force that the robot senses on the hand [N, world] (3), and the force that
-/// objects exert on it [N, world] (3).
+/// Appends the values of a hand: the wrist's pose (7), its target's pose (7), its state (1), and the errors
+/// [m, rad]. Two forces follow: the force that the robot senses on the hand [N, world] (3), and the force
+/// that objects exert on it [N, world] (3).
 fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f32>) {
     let robot: &RobotStep = &step.robots[index];
     let world_from_wrist = robot.truth.world_from_wrist[side];
@@ -84,8 +84,8 @@ fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f3
     row.extend((-exerted_n.sum::<tandem_sim::Vector>()).to_array());
 }
 
-/// Returns the number of a state. 0 is also the number of a hand without a wrist target, which follows
-/// joint targets.
+/// Returns the number of a state. A hand without a wrist target, which follows joint targets, has the number
+/// 0, too.
 fn state_number(state: HandState) -> f32 {
     match state {
         HandState::Idle => 0.0,

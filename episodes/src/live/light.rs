@@ -6,7 +6,8 @@ use tandem_sim::render::{Lamp, Lamps};
 
 use super::geometry::carrier_row;
 
-/// Returns the lights of a file. Their colours multiply the file's as they are, and not as linear light.
+/// Returns the lights of a file. Their colours multiply the file's surface colours directly, without
+/// conversion to linear light.
 pub fn lights(lamps: &Lamps) -> Value {
     let Lamps { headlight, lamps } = lamps;
     let Headlight { ambient_rgb, diffuse_rgb, specular_rgb } = headlight;

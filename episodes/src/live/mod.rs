@@ -27,11 +27,11 @@ pub trait Onlookers: Send {
     /// Returns true while there are viewers; without them, no events are sent.
     fn any(&self) -> bool;
 
-    /// Returns true if the control step with this number, which has just been made, is wanted. The last
-    /// step of a call is sent in any case.
+    /// Returns true if viewers want the control step with this number, which has just been made. The last
+    /// step of a call is always sent.
     fn wants_step(&self, control_step: u64) -> bool;
 
-    /// Passes on an event. Must not block.
+    /// Sends an event to the viewers. Must not block.
     fn tell(&self, event: LiveEvent);
 }
 
@@ -47,7 +47,7 @@ pub enum LiveEvent {
     /// A tool call with its reply, or a note.
     Entry(Arc<LiveEntry>),
     Phase(PhaseReached),
-    /// The next phase, and its missing conditions.
+    /// The next phase, and its conditions that do not hold.
     NextPhase(Arc<NextPhase>),
     /// The result. The episode takes no more commands.
     Ended(Arc<ResultReply>),

@@ -26,7 +26,7 @@ pub struct LiveScene {
     textures: Vec<Arc<LiveTexture>>,
     robots: Vec<RobotFrame>,
     cameras: Cameras,
-    /// Motions of the viewer's own, set to the states of the episode's motions.
+    /// Separate motions for viewers, set to the states of the episode's motions.
     motions: Mutex<Vec<Motion>>,
     drawing: Mutex<Drawing>,
 }
@@ -106,8 +106,9 @@ impl LiveScene {
         frame::row(live, &mut motions, &self.robots)
     }
 
-    /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot. The
-    /// name [`LiveScene::THIRD_PERSON`] is that of the room's camera. The episode does not wait for it.
+    /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot.
+    /// [`LiveScene::THIRD_PERSON`] is the name of the room's camera. The episode does not wait for the
+    /// rendering.
     pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let view: CameraView = match self.robots.iter().position(|robot| robot.name == name) {
             Some(robot) => self.cameras.eye(step, robot),

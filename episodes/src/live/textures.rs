@@ -30,7 +30,7 @@ pub struct ImageFile {
 #[derive(Default)]
 pub(crate) struct SceneTextures {
     pub found: Vec<Arc<LiveTexture>>,
-    /// Numbers in `found`, by addresses. Equal images at several addresses share a number.
+    /// Indices in `found`, by address. Equal images at several addresses share an index.
     numbers: HashMap<*const Texture, usize>,
 }
 
@@ -46,8 +46,8 @@ impl LiveTexture {
         &self.hash
     }
 
-    /// Returns the image as a file: PNG, or JPEG if that is smaller and nothing is transparent. The six images
-    /// of a cube are below one another.
+    /// Returns the image as a file: PNG, or JPEG if that is smaller and nothing is transparent. The six
+    /// images of a cube are stacked vertically.
     ///
     /// # Errors
     ///

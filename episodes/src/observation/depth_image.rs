@@ -26,7 +26,7 @@ pub fn depth_image(robot: &str, view: &RobotView) -> Result<DepthImage, PictureE
     Ok(DepthImage { robot: robot.into(), white_m, black_m, png_base64 })
 }
 
-/// Returns the depths that are white and black, as the reply has them.
+/// Returns the depths drawn in white and in black, as the reply states them.
 fn range_m(depth_m: &[f32]) -> [f64; 2] {
     let mut seen_m: Vec<f32> = depth_m.iter().copied().filter(|depth_m| depth_m.is_finite()).collect();
     seen_m.sort_by(f32::total_cmp);

@@ -260,7 +260,7 @@ fn edges(mut points: Vec<Vector2<f64>>) -> Vec<Edge> {
     found
 }
 
-/// Returns the points where two edges that extend to them meet.
+/// Returns the corners: intersections of two edges that both extend to them.
 fn corners_of(edges: &[Edge]) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();
     for (index, Edge { line: one, .. }) in edges.iter().enumerate() {

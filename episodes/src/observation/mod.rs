@@ -24,7 +24,7 @@ pub use scaling::{drawing_view, scaled_colours};
 pub struct TeamObservation {
     pub time_s: f64,
     pub robots: Vec<RobotObservation>,
-    /// True to show images of depth, too.
+    /// True to show depth images, too.
     pub shows_depth: bool,
 }
 
@@ -42,10 +42,10 @@ pub struct RobotView {
     pub intrinsics: Intrinsics,
     /// Shared, because the recording may need it after the rest of the view is dropped.
     pub picture: Arc<Picture>,
-    /// Depth as in [`Frame::depth_m`]. Some protocols withhold it at all pixels from policies, so they
-    /// receive it through calls only. Empty in a view for the recording alone.
+    /// Depth as in [`Frame::depth_m`]. Some protocols withhold whole depth images from policies, which then
+    /// receive depth through calls only. Empty in a view for the recording alone.
     pub(crate) depth_m: Vec<f32>,
-    /// Ids of visible things as in [`Frame::ids`], for [`surface`] alone. Empty like the depth.
+    /// Ids of visible things as in [`Frame::ids`], for [`surface`] alone. Empty whenever the depth is.
     ids: Vec<u32>,
 }
 

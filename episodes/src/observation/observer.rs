@@ -36,7 +36,7 @@ pub struct Observer {
 
 /// An object of the task, or a part that moves on one.
 struct NamedObject {
-    /// Name in the description of the room. That of a part begins with the object's.
+    /// Name in the description of the room. A part's name begins with the object's name.
     name: String,
     /// Name of the task's object: the object itself, or the one that the part belongs to.
     owner: String,
@@ -52,7 +52,7 @@ struct DrawnStep {
     views: Vec<Option<Arc<RobotView>>>,
 }
 
-/// Returns the task's objects and the parts that move on them; a scene may have further ones.
+/// Returns the task's objects and the parts that move on them. A scene may contain other objects.
 fn named_objects(spec: &EpisodeSpec, world: &World) -> Vec<NamedObject> {
     let is_part_of = |own: &str, object: &str| {
         own.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -164,7 +164,7 @@ impl Observer {
         let missing: BTreeSet<usize> =
             robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
         let eyes: Vec<CameraView> = missing.iter().map(|robot| self.cameras.eye(step, *robot)).collect();
-        // If all have been rendered, the renderer need not even place the scenery.
+        // If all views have been rendered, the renderer need not even place the scenery.
         let frames = match eyes.is_empty() {
             true => Vec::new(),
             false => CameraView::render_all(&eyes, &mut *self.renderer, step),
@@ -311,7 +311,7 @@ impl Observer {
         !self.cameras.are_ideal() && !view.depth_m[pixel].is_finite()
     }
 
-    /// Returns the surface of each object of the task that is seen, with its parts.
+    /// Returns the surface of each visible object of the task, including its parts.
     fn each_object(&self, view: &RobotView, poses: &CameraPoses) -> Vec<Surface> {
         let mut ids: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
         for object in &self.objects {

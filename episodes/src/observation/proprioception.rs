@@ -26,7 +26,7 @@ impl Detail {
     }
 }
 
-/// The part of a step that a robot knows about itself.
+/// Proprioceptive part of a step, for one robot.
 pub struct Proprioception<'a> {
     pub time_s: f64,
     pub sensed: &'a RobotSensed,

@@ -13,8 +13,8 @@ use super::Picture;
 /// An image, for the functions of the library `image`.
 pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
 
-/// Returns the view that renders images of this size. A smaller image of the same shape is the camera's own
-/// image, scaled: a policy that requests this size gets the same.
+/// Returns the view that renders images of this size. A smaller image of the same aspect ratio is the
+/// camera's own image, scaled. A policy that requests this size gets the same image.
 pub fn drawing_view(own: CameraView, [width, height]: [u32; 2]) -> CameraView {
     let camera = own.camera;
     let same_shape =

@@ -112,8 +112,8 @@ impl EpisodePage<'_> {
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
     }
 
-    /// Returns the models' reasons for ending their play, with their own words. `None` if the end of the
-    /// episode already says it.
+    /// Returns the models' reasons for ending their play, in the models' words. `None` if the end of the
+    /// episode already states the reason.
     fn model_endings(&self) -> Option<String> {
         let endings = self.result.usage.iter().flat_map(Usage::own_endings);
         let told = endings.map(|ended| match ended.text.is_empty() {
@@ -208,8 +208,7 @@ impl EpisodePage<'_> {
         format!(r#"<table class="words">{rows}</table>"#)
     }
 
-    /// Renders the messages; empty if there are none.
-    /// Renders the usage of language models: that of each robot's, if each has its own, and the sum.
+    /// Renders the usage of language models: a row for each robot that has separate usage, and the sum.
     fn models(&self) -> String {
         let Some(usage) = &self.result.usage else { return String::new() };
         let row = |robot: &str, model: &str, [input, cached, output]: [u64; 3], costs: [Option<f64>; 2]| {
@@ -238,6 +237,7 @@ impl EpisodePage<'_> {
         )
     }
 
+    /// Renders the messages; empty if there are none.
     fn said(&self) -> String {
         if self.said.is_empty() {
             return String::new();

@@ -23,7 +23,7 @@ const DOWN_RAD: f32 = 0.65;
 const DISTANCE_PER_RADIUS: f32 = 2.4;
 const MIN_RADIUS_M: f32 = 0.05;
 
-/// Draws a scene, as its file has it, from four sides into one PNG file.
+/// If the scene cannot be read or drawn. The error lists all refused parts of the file.
 ///
 /// # Errors
 ///

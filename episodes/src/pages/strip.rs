@@ -1,5 +1,5 @@
-//! Image strips: one column per key moment, the third-person view above, the robots' own views below. A
-//! strip carries its texts twice: drawn, for display of the file, and as metadata, for pages made from it.
+//! Image strips: one column per key moment, with the third-person view above and the robots' views below. A
+//! strip contains its texts twice: drawn into the image, and as metadata for pages made from the file.
 
 use std::fs::File;
 use std::io::{self, BufReader};

@@ -31,7 +31,7 @@ pub trait PrivilegedEpisode: Episode {
 /// An episode in the caller's own process, which shows images as rendered.
 pub trait LocalEpisode: Episode {
     /// Returns the image, depth and readings that a call of `observe` shows, rendered and complete. `shown`
-    /// is the extra information that the policy receives beyond the benchmark's own policies.
+    /// is the information shown to the policy that the benchmark withholds from its policies.
     fn observe(
         &mut self,
         observe: &Observe,
@@ -141,7 +141,7 @@ impl PlayerEntry {
     ///
     /// # Errors
     ///
-    /// The reason if it cannot.
+    /// Returns the reason if it cannot.
     pub fn check(&self, spec: &EpisodeSpec) -> Result<(), PlayerError> {
         match self.make {
             PlayerFactory::Player(make) => make(spec).map(drop),

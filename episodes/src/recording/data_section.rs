@@ -19,8 +19,8 @@ use super::metadata;
 
 /// Upper limit of the expansion factor of LZ4's format.
 const LZ4_MOST_EXPANSION: u64 = 255;
-/// Upper limit for Zstandard's format: a block of at most 128 KiB takes three bytes and one that is
-/// repeated.
+/// Upper limit of the expansion factor of Zstandard's format: a block of at most 128 KiB can be encoded as a
+/// header of three bytes and one byte to repeat.
 const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
 /// Maximum size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
@@ -54,7 +54,7 @@ pub struct DataSection<'a> {
     pub without_checksum: WithoutChecksum,
 }
 
-/// Number of parts without a checksum of their own.
+/// Number of parts without a separate checksum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WithoutChecksum {
     pub chunks: usize,

@@ -1,5 +1,5 @@
 //! An MCAP file with typed topics, under another name until it is complete. Its bytes go to a file that
-//! others can read under way, or to memory until the end.
+//! others can read in the meantime, or to memory until the end.
 
 use std::{
     collections::BTreeMap,
@@ -160,7 +160,7 @@ pub struct LiveChannel {
     pub topic: String,
     pub encoding: String,
     pub schema: Option<Schema>,
-    /// Names of an array's columns, for example.
+    /// Description of the channel, for example the names of an array's columns.
     pub metadata: BTreeMap<String, String>,
 }
 

@@ -52,7 +52,7 @@ pub struct RecordedCall {
     pub arguments: Value,
     /// The robot whose operator made the call; `None` if one policy directed all robots.
     pub operator: Option<String>,
-    /// Extra information that a policy in the simulator's process was shown, beyond the benchmark's own
+    /// Information shown to a policy in the simulator's process that the benchmark withholds from its
     /// policies. `None` if the policy was shown the whole reply.
     pub shown: Option<Vec<ExtraInformation>>,
     /// The reply as JSON, without images; or the text of the problem.

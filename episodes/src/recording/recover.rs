@@ -30,7 +30,7 @@ pub struct Recovered {
 #[derive(Debug)]
 pub struct LeftOut {
     pub damage: Damage,
-    /// Length from there to the end of the file.
+    /// Length from the first damaged part to the end of the file.
     pub bytes: usize,
 }
 

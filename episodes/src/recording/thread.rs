@@ -1,4 +1,4 @@
-//! A recorder on a thread of its own, so that an episode does not wait for encoding and compression.
+//! A recorder on a separate thread, so that an episode does not wait for encoding and compression.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -17,7 +17,7 @@ const GATHERED: Duration = Duration::from_millis(250);
 /// Maximum number of pending appends before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
 
-/// Steps that are handed to the system in one go: fewer would make chunks that compress badly.
+/// Number of steps written to the system at once: fewer would make chunks that compress badly.
 const GATHERED_STEPS: usize = 12;
 
 /// Maximum number of steps that a killed process loses. At this number, the episode waits until the system
@@ -50,7 +50,7 @@ pub struct RecorderThread {
     /// The first failure. The recording ends there, because a gap would follow.
     failed: Arc<OnceLock<String>>,
     waiting_pictures: Arc<AtomicUsize>,
-    /// Steps that the system does not have yet.
+    /// Number of steps that have not been written to the system yet.
     unwritten_steps: Arc<AtomicUsize>,
     hurry: Arc<AtomicBool>,
     /// True while the episode is restored from a journal. The journal has its calls, so its steps may be

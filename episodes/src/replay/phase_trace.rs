@@ -34,7 +34,7 @@ pub struct ConditionTrace {
     pub setting: PhaseSetting,
     /// Duration for which the condition has to hold without interruption.
     pub for_s: f64,
-    /// Record of all its parts together.
+    /// Record of the times at which all its parts held together.
     pub held: Held,
     pub parts: Vec<PartTrace>,
     /// Largest number of parts that held at once.

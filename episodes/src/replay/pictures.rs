@@ -39,9 +39,9 @@ pub struct PicturesPlan {
     pub cameras: Vec<String>,
     /// True if depth is rendered, too.
     pub depth: bool,
-    /// The renderer; `None` for the one of the recorded episode.
+    /// The renderer; `None` for the recorded episode's renderer.
     pub renderer: Option<RendererKind>,
-    /// The model of the head cameras; `None` for the one of the recorded episode.
+    /// The model of the head cameras; `None` for the recorded episode's model.
     pub camera: Option<CameraModel>,
 }
 

@@ -99,8 +99,8 @@ impl EpisodeRenderer {
     }
 
     /// Returns the image of a camera after `step`, in its own size or in another, without depth. A smaller
-    /// image of the same shape is the camera's own image, scaled: a policy that requests this size gets the
-    /// same.
+    /// image of the same aspect ratio is the camera's own image, scaled. A policy that requests this size
+    /// gets the same image.
     pub fn colours(&mut self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
         let own = self.view(of, step, None);
         let own_px = [own.camera.width, own.camera.height];

@@ -19,7 +19,7 @@ pub struct Verification {
     pub calls: usize,
     /// Steps at the end of an interrupted recording that belong to a call without a recorded reply.
     pub unanswered_steps: usize,
-    /// The build that recorded the episode, if it is another: builds may differ in their physics.
+    /// The build that recorded the episode, if it is not this one: builds may differ in their physics.
     pub other_build: Option<String>,
     pub outcome: Verdict,
 }
@@ -30,7 +30,7 @@ pub enum Verdict {
     /// Every state, the result, and the phases scored from the recorded steps agree.
     Same,
     State(Difference),
-    /// The states agree and the results do not: the differing part, as recorded and as simulated.
+    /// The states agree, but the results differ: the differing part, as recorded and as simulated.
     Result {
         what: &'static str,
         recorded: String,

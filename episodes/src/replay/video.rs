@@ -68,11 +68,11 @@ impl VideoFormat {
 #[derive(Clone, Copy, Debug)]
 pub struct FilmPlan {
     pub view: EpisodeCamera,
-    /// `None`: the camera's own.
+    /// Size of the frames; `None` for the camera's own size.
     pub size: Option<PictureSize>,
     /// Frames per second of simulated time.
     pub rate_hz: u32,
-    /// Duration of the video, to a frame. `None`: that of the episode.
+    /// Duration of the video, rounded to a frame; `None` for the episode's duration.
     pub duration_s: Option<u32>,
 }
 
@@ -115,7 +115,7 @@ pub fn film(recording: &Recording, plan: &FilmPlan, path: &Path) -> Result<usize
     Ok(pictures)
 }
 
-/// A short video for a page, with at most `SHORT_PICTURES` frames for any length of episode. It plays for
+/// A short video for a page, with at most `SHORT_PICTURES` frames for any length of episode. It lasts a few
 /// seconds and has at most a quarter of a megabyte.
 pub struct ShortFilm {
     pub webp: Vec<u8>,
@@ -240,11 +240,11 @@ impl FilmWriter {
     }
 }
 
-/// Starts an ffmpeg that reads raw frames and writes a video that every player supports.
+/// Starts an ffmpeg process that reads raw frames and writes a video that every player supports.
 fn ffmpeg([width, height]: [u32; 2], rate_hz: f64, path: &Path) -> Result<Child, VideoError> {
     let (size, rate) = (format!("{width}x{height}"), rate_hz.to_string());
     let takes = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size, "-r", &rate, "-i", "-"];
-    // Players need an even number of pixels each way, and the index in front.
+    // Players need an even width and height, and the index at the beginning of the file.
     let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
     let writes = ["-vf", even, "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"];
     let ffmpeg = Command::new("ffmpeg")

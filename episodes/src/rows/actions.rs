@@ -59,7 +59,7 @@ impl ActionKind {
 
     /// Returns the call that carries out a world's rows, one for each robot, in `steps` control steps.
     ///
-    /// before_rows: Joint rows of the commands in force, which joint targets start from.
+    /// before_rows: Joint rows of the commands in force, from which joint targets start.
     pub fn call<'a>(
         self,
         robots: impl Iterator<Item = &'a str>,

@@ -1,8 +1,8 @@
 //! Rows of observations and actions: the layout that data sets and environments share.
 //!
-//! A row is one moment of a robot: its state, and its action until the next row. Joint targets and the
-//! height of the pelvis are those to reach by the next row, on a straight line; velocities of the base hold
-//! until then. At the control rate, a row is one row of `send_joint_chunk`.
+//! A row is one moment of a robot: its state, and its action until the next row. Joint targets and the pelvis
+//! height are to be reached by the next row, on a straight line; base velocities hold until then. At the
+//! control rate, a row is one row of `send_joint_chunk`.
 
 mod actions;
 mod column;

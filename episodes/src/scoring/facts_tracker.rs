@@ -8,12 +8,12 @@ use tandem_sim::{ObjectFile, ObjectModel, Pose, RobotModel, SimError, Step};
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
 
-/// Knowledge of every object from the steps up to now.
+/// Tracked state of every object, from the steps so far.
 #[derive(Clone, Debug)]
 pub struct FactsTracker {
     /// The model of each object from its file.
     models: Vec<Arc<ObjectModel>>,
-    /// Name of the object that carries each; `None` for those that the world does.
+    /// For each object, the name of the object that carries it; `None` if the world carries it.
     carriers: Vec<Option<String>>,
     robot: Arc<RobotModel>,
     memory: Vec<ObjectMemory>,

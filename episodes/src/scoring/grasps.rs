@@ -107,7 +107,7 @@ impl ObjectGrasps {
     }
 }
 
-/// Presses on both sides of every threshold, and their durations.
+/// Tests of presses at both sides of every threshold, and of their durations.
 #[cfg(test)]
 mod tests {
     use tandem_sim::{BodyTouch, ObjectState, ObjectStep, Pose};

@@ -1,5 +1,5 @@
-//! Scoring: the holds in each control step, and the phases reached by them. It reads steps and knows no
-//! task.
+//! Scoring: the holds in each control step, and the phases reached by them. It depends on steps alone, not on
+//! tasks.
 
 mod facts;
 mod facts_tracker;

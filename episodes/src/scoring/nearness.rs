@@ -1,5 +1,5 @@
-//! Nearness of a phase, from 0 to 1, the basis of dense rewards for learners. A part of it is 1 if the
-//! phase's own condition on it holds, and grows on the way there. It affects neither results nor phases.
+//! Nearness of a phase, from 0 to 1, the basis of dense rewards for learners. Each of its parts is 1 if the
+//! phase's condition on that part holds, and grows towards 1 before. It affects neither results nor phases.
 
 use tandem_sim::{Pose, Side, Vector};
 
@@ -26,12 +26,13 @@ pub fn is(condition: bool) -> f32 {
     f32::from(u8::from(condition))
 }
 
-/// Returns the share of the way from one value to another that `value` has come.
+/// Returns the fraction of the way from `from_value` to `to_value` that `value` has covered.
 pub fn come(value: f32, from_value: f32, to_value: f32) -> f32 {
     ((value - from_value) / (to_value - from_value)).clamp(0.0, 1.0)
 }
 
-/// Returns how near a hand is to holding `object`: the first half is the approach to the box around it.
+/// Returns the nearness of a hand to holding `object`, from 0 to 1. The first half is the approach to the box
+/// around the object.
 pub fn grip(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
     match f.object(object).hands[robot][side] {
         Grip::Holding => 1.0,
@@ -40,7 +41,7 @@ pub fn grip(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
     }
 }
 
-/// Returns how near these robots are to holding `object`, each with its nearer hand.
+/// Returns the nearness of these robots to holding `object`, each by its nearer hand.
 pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
     let nearer =
         |robot: &usize| Side::BOTH.map(|side| grip(f, *robot, side, object)).into_iter().fold(0.0, f32::max);

@@ -1,5 +1,5 @@
-//! Score of one episode: grasps, facts and phases, step by step. A live episode and its recording are
-//! scored alike.
+//! Score of one episode: grasps, facts and phases, step by step. A live episode and its recording are scored
+//! in the same way.
 
 use std::sync::Arc;
 
@@ -86,8 +86,8 @@ impl Scores {
         ScoreMemory { objects: self.tracker.memory().to_vec(), phases: self.phases.memory().clone() }
     }
 
-    /// Restores an earlier [`Scores::memory`] of the same phases and objects. If it belongs to others, it is
-    /// left unused and the function returns `false`.
+    /// Restores an earlier [`Scores::memory`] of the same phases and objects. A memory of other phases or
+    /// objects is left unused, and the function returns `false`.
     #[must_use]
     pub fn set_memory(&mut self, memory: ScoreMemory) -> bool {
         if !self.tracker.fits(&memory.objects) || !self.phases.fits(&memory.phases) {

@@ -49,7 +49,7 @@ impl<'a> From<&'a Answer> for CallOutcome<'a> {
 }
 
 impl Session {
-    /// Answers a call of the operator of a robot, or of the policy of all.
+    /// Answers a call of the operator of a robot, or of the policy that directs all robots.
     pub(super) fn answer(
         &mut self,
         operator: Option<&str>,
@@ -239,7 +239,7 @@ impl Session {
     }
 }
 
-/// Adds the commanded poses of wrists that have some, in the state's own frame.
+/// Adds the commanded poses of wrists that have one, in the frame of the state.
 fn tell_targets(state: &mut RobotState, motion: &Motion) {
     let frame_from_pelvis = motion.pelvis_from(state.frame.unwrap_or_default()).inverse();
     let wrists = motion.wrists();

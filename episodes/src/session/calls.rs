@@ -1,6 +1,5 @@
-//! Calls to an episode: a [`Request`] has a caller, a call, and an audience for the answer. Everything
-//! passes through here: refusals that do not count, withholding, recording, counting, and control of the
-//! policy's clock.
+//! Calls to an episode: a [`Request`] has a caller, a call, and an audience for the answer. This module
+//! handles refusals that do not count, withholding, recording, counting, and control of the policy's clock.
 
 use tandem_sim::Step;
 use tandem_tools_spec::{
@@ -41,8 +40,8 @@ pub enum Caller<'a> {
 pub enum Audience<'a> {
     /// The caller; it receives the information that the episode's assistance grants.
     Caller,
-    /// This process, which receives all information on behalf of a policy. The list is the information
-    /// shown to the policy beyond the benchmark's own policies; results name it.
+    /// This process, which receives all information on behalf of a policy. The list is the information shown
+    /// to the policy that the benchmark withholds from its policies; results name it.
     Process(&'a [ExtraInformation]),
 }
 
@@ -51,7 +50,8 @@ pub enum Audience<'a> {
 pub struct Outcome {
     answer: Answer,
     formats: Formats,
-    /// For each caller of the request: true for a short reply, and the observation afterwards.
+    /// For each caller of the request: true for a short reply, and the observation requested after the
+    /// command.
     parts: Vec<(bool, Option<SeenAfter>)>,
 }
 
@@ -131,7 +131,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// The reason why the call is refused or fails.
+    /// Returns the reason why the call is refused or fails.
     pub fn perform(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
         let arrival = self.arrival(|| request.asked());
         let outcome = self.do_what_is_asked(request);
@@ -171,16 +171,16 @@ impl Session {
         Ok(self.perform(Request::of_policy(call))?.reply()?.reply)
     }
 
-    /// Performs a call like [`Session::call`], with its options, by the operator of a robot or by the
-    /// policy of all.
+    /// Performs a call like [`Session::call`], with its options, by the operator of a robot or by the policy
+    /// that directs all robots.
     pub fn ask(&mut self, operator: Option<&str>, call: Call) -> Result<CallReply, EpisodeError> {
         let caller = operator.map_or(Caller::Policy, Caller::Operator);
         self.perform(Request { caller, ..Request::of_policy(call) })?.reply()
     }
 
     /// Observes like [`Session::call`] with `observe`, on behalf of a policy in this process. Views are not
-    /// encoded, and no data are withheld. `shown` is the information shown to the policy beyond the
-    /// benchmark's own policies.
+    /// encoded, and no data are withheld. `shown` is the information shown to the policy that the benchmark
+    /// withholds from its policies.
     pub fn observe(
         &mut self,
         observe: &Observe,
@@ -206,8 +206,8 @@ impl Session {
         Ok(self.perform(Request { audience, ..Request::of_policy(call) })?.reply()?.reply)
     }
 
-    /// Executes the commands of several operators at the same time, then makes each one's requested
-    /// observation.
+    /// Executes the commands of several operators at the same time, then makes the observation that each
+    /// operator requested.
     pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
         let mut calls = Vec::with_capacity(commands.len());
         for OperatorCommand { call, used, .. } in commands {
@@ -219,8 +219,8 @@ impl Session {
         self.perform(Request::of_policy(Called::Together(calls)))?.replies()
     }
 
-    /// Reads an operator's command, to be executed by [`Session::together`] once those of the other
-    /// operators have been read. A refusal is counted and recorded like that of any call.
+    /// Reads an operator's command, to be executed by [`Session::together`] once the other operators'
+    /// commands have been read. A refusal is counted and recorded like that of any call.
     pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::command(&call));
         let read = self.read_or_refuse(call);
@@ -375,9 +375,9 @@ impl Session {
         }
     }
 
-    /// Notes the arrival of a call. The clock pauses during the call, except for a policy's own
-    /// observation; otherwise repeated observations would give free thinking time. Returns true if the
-    /// call belongs to the episode.
+    /// Registers a call before it is made. The clock pauses during the call, except for a policy's own
+    /// observation; otherwise repeated observations would give free thinking time. Returns true if the call
+    /// belongs to the episode.
     fn arrived(&mut self, caller: CallerRecord, is_look: bool) -> bool {
         self.clock.pause();
         if self.ended.is_none() && self.clock.exhausted() {
@@ -395,7 +395,7 @@ impl Session {
         underway
     }
 
-    /// Counts a request of the policy: a call, or a plan of several.
+    /// Counts a request of the policy: a call, or a plan of several calls.
     pub(super) fn count_request(&mut self) {
         self.requests = self.requests.map(|requests| requests + 1);
     }

@@ -17,7 +17,7 @@ pub struct JournalEntry {
     /// The policy's thinking time when the request came, in nanoseconds.
     thought_ns: u64,
     pub(super) asked: KeptRequest,
-    /// State of the world afterwards, if it has changed.
+    /// State of the world after the request, if the request changed it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) state: Option<StateMark>,
     /// Reason for the end of the episode, if it had ended by that time.
@@ -91,7 +91,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// The reason why an entry is missing; the journal is then worthless.
+    /// Returns the reason why an entry is missing. The journal cannot be used then.
     pub fn take_journal(&mut self) -> Result<Vec<JournalEntry>, String> {
         let Some(journal) = &mut self.journal else { return Ok(Vec::new()) };
         match journal.failed.take() {
@@ -100,7 +100,7 @@ impl Session {
         }
     }
 
-    /// Returns the arriving request, if a journal is kept.
+    /// Returns the current request with the policy's thinking time, if a journal is kept.
     pub(super) fn arrival(&self, asked: impl FnOnce() -> Result<KeptRequest, serde_json::Error>) -> Arrival {
         self.journal.as_ref().map(|_| (self.clock.spent() + self.clock.thinking(), asked()))
     }

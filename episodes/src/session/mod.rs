@@ -71,8 +71,8 @@ pub struct Session {
     spectators: Spectators,
     /// Number of tool calls, up to the end.
     tool_calls: u32,
-    /// Number of requests: calls, with one for each plan. `None` in a replay, where the calls of plans
-    /// are not marked.
+    /// Number of requests: a plan counts as one, like a single call. `None` in a replay, where the calls of
+    /// plans are not marked.
     requests: Option<u32>,
     /// Requests and thinking time of the operators, by robot, as the host reports with their commands.
     operators: BTreeMap<String, OperatorUse>,
@@ -88,7 +88,7 @@ pub struct Session {
     /// Reason of a simulator failure, if there was one.
     simulator_failure: Option<String>,
     rewind: Rewind,
-    /// Information shown to the policy beyond the benchmark's own policies.
+    /// Information shown to the policy that the benchmark withholds from its policies.
     shown: ShownInformation,
     /// Departures from the benchmark in the policy's commands.
     departures: BTreeSet<String>,
@@ -100,7 +100,7 @@ pub struct Session {
     hashes: Option<Vec<u64>>,
     /// Journal of requests, if one is kept.
     journal: Option<Journal>,
-    /// Final result, set when the files are closed; all parties receive this one.
+    /// Final result, set when the files are closed; every caller receives this result.
     result: Option<ResultReply>,
 }
 
@@ -110,7 +110,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// The reason why the world cannot be built, or the start state cannot be read.
+    /// Returns the reason why the world cannot be built, or the start state cannot be read.
     pub fn start(spec: &EpisodeSpec, folder: Option<&Path>) -> Result<Session, EpisodeError> {
         Session::start_with_clock(spec, folder.map(RunFolder::from), monotonic())
     }
@@ -421,8 +421,8 @@ impl Session {
         self.observer.draws_together()
     }
 
-    /// Returns a request for the images of [`Session::eye`] of all robots before they are scaled, to be
-    /// rendered together with those of other episodes.
+    /// Returns a request for the images of [`Session::eye`] of all robots before they are scaled. It is
+    /// rendered together with the requests of other episodes.
     pub fn eyes(&mut self, size_px: [u32; 2]) -> RenderRequest<'_> {
         self.observer.eyes(&self.present, size_px)
     }
@@ -485,7 +485,7 @@ impl Session {
     }
 }
 
-/// Returns [`fingerprint::build`] with an episode's error.
+/// Returns [`fingerprint::build`], with its error as an [`EpisodeError`].
 fn this_build() -> Result<&'static str, EpisodeError> {
     fingerprint::build().map_err(EpisodeError::Build)
 }

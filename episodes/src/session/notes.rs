@@ -15,7 +15,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// An invalid note, another operator's robot, or an episode that has ended.
+    /// If the note is invalid or is about another operator's robot, or if the episode has ended.
     pub fn note(&mut self, operator: Option<&str>, note: Note) -> Result<(), EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::note(operator, &note));
         let kept = self.keep_note(operator, note);
@@ -52,7 +52,7 @@ impl Session {
         self.write_down(arrival);
     }
 
-    /// Records a request and its outcome that are not a call of the episode.
+    /// Records a request that is not a call of the episode, and its outcome.
     pub(super) fn tell_beside(
         &mut self,
         operator: Option<&str>,

@@ -50,7 +50,7 @@ impl Session {
             .collect()
     }
 
-    /// Returns the fallen robots as the policy may know them.
+    /// Returns the fallen robots that are disclosed to the policy; none under the paper's assistance.
     pub(super) fn told_fallen(&self) -> Vec<RobotFallen> {
         match self.spec().assistance {
             Assistance::Paper => Vec::new(),
@@ -63,7 +63,7 @@ impl Session {
         self.spec().disclosure.ends_on_success() && self.scores.complete()
     }
 
-    /// Returns the phases reached as the policy may know them.
+    /// Returns the phases reached, if they are disclosed to the policy; none otherwise.
     pub(super) fn phases(&self) -> Vec<PhaseReached> {
         match self.spec().disclosure.tells(self.ended.is_some()) {
             true => self.reached(),

@@ -26,7 +26,7 @@ impl EpisodeSpec {
         self.keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn)
     }
 
-    /// Returns the seed as the policy may know it; `None` under the paper's assistance.
+    /// Returns the seed disclosed to the policy; `None` under the paper's assistance.
     pub fn told_seed(&self) -> Option<u32> {
         match self.assistance {
             Assistance::Paper => None,

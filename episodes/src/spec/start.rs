@@ -42,7 +42,7 @@ pub struct MomentStart {
     pub recording: PathBuf,
     /// Control step of the recorded episode.
     pub control_step: u64,
-    /// Seconds before the failure of the recorded episode; `None` where an operator took over.
+    /// Seconds before the failure of the recorded episode; `None` if an operator took over.
     #[serde(default)]
     pub before_s: Option<u32>,
 }

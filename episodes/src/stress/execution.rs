@@ -23,7 +23,7 @@ pub struct Execution {
     disturbance: Option<Disturbance>,
     /// Time at which the policy takes over.
     begin_s: f64,
-    /// Commands before the first one has arrived.
+    /// Commands executed until the first command takes effect.
     rest: Vec<RobotCommand>,
     memory: ExecutionMemory,
 }
@@ -40,8 +40,8 @@ pub struct ExecutionMemory {
 }
 
 impl Execution {
-    /// Creates the execution of an episode; `None` if robots do exactly as commanded. They are at `rest` at
-    /// first, and their policy takes over at `begin_s`.
+    /// Creates the execution of an episode; `None` if robots do exactly as commanded. `rest` are
+    /// the commands at the episode's start, and the policy takes over at `begin_s`.
     pub fn of(
         stress: Option<Stress>,
         disturbance: Option<Disturbance>,

@@ -38,7 +38,7 @@ fn files() -> &'static Distractors {
 
 /// Maximum distance between an object's lowest point and the top of its support.
 const CONTACT_M: f32 = 0.015;
-/// Free space beside a distractor; `ABOVE_M` is that above the support.
+/// Free space beside a distractor; `ABOVE_M` is the free space above its support.
 const BESIDE_M: f32 = 0.03;
 const ABOVE_M: f32 = 0.01;
 /// Number of placement attempts for each distractor.

@@ -14,7 +14,7 @@ const WARMTH: [f32; 3] = [0.08, 0.16, 0.28];
 const TURN_DEG: [f32; 3] = [40.0, 80.0, 140.0];
 const LOWER_DEG: [f32; 3] = [6.0, 14.0, 26.0];
 
-/// Changes the light of a scenery: that of sun and sky, or that of the lights of the scene's file.
+/// Changes the light of a scenery: sun and sky, or the lights of the scene's file.
 pub fn relight(scenery: &mut Scenery, level: StressLevel, seed: u32) {
     let plain = scenery.light;
     scenery.light = light(level, seed);

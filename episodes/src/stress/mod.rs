@@ -1,6 +1,7 @@
-//! Stress on episodes, to measure the robustness of policies: one axis per file. Each is a function of seed
-//! and level alone, applied to the episode of the plain run. The two can therefore be compared seed by
-//! seed. Its effects on robots and objects are forces or properties that a real world could have.
+//! Stress on episodes, to measure the robustness of policies: one axis per file. Each stress is a function of
+//! seed and level alone, applied to the episode of the plain run. Stressed and plain runs can therefore be
+//! compared seed by seed. The effects on robots and objects are forces or properties that a real world could
+//! have.
 //!
 //! To add an axis: one file here, its name in [`StressAxis`], and the place where it acts.
 

@@ -15,7 +15,7 @@ const LATE_STEPS: [usize; 3] = [15, 30, 60];
 /// Duration of a walk-off; `WALK_M_S` is its speed.
 const WALK_S: [f64; 3] = [1.0, 2.0, 3.0];
 const WALK_M_S: f32 = 0.25;
-/// Duration for which its hands are open.
+/// Duration for which the robot's hands are open.
 const OPEN_S: [f64; 3] = [0.4, 0.8, 1.6];
 /// Denominator of the share of its messages that are delivered: one in two, one in four, and at the third
 /// level none.

@@ -28,7 +28,7 @@ pub fn reworded_tasks() -> impl Iterator<Item = &'static str> {
     rewordings().keys().map(String::as_str).chain(plus.map(|task| task.id.as_str()))
 }
 
-/// Returns the reworded instructions of a task, from its file or from those of the benchmark; `None` if
+/// Returns the reworded instructions of a task, from its file or from the benchmark's rewordings; `None` if
 /// there are none.
 pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
     if !task.is_benchmark() {

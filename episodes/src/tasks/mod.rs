@@ -211,7 +211,8 @@ pub fn told_name(name: &str) -> String {
 }
 
 impl ObjectSpot {
-    /// Returns the object's parts in a frame at its origin that its yaw alone turns.
+    /// Returns the object's parts in a frame at the object's origin that follows the object's yaw, but no
+    /// other rotation.
     pub fn parts(&self) -> Result<Vec<ObjectPart>, SimError> {
         let mut parts = ObjectModel::parts(&self.source, &self.name)?;
         if self.is_of_scene() {

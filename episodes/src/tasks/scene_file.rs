@@ -34,7 +34,7 @@ impl SceneFile {
     ///
     /// # Errors
     ///
-    /// An unreadable file, or [`SceneError::Changed`].
+    /// If the file cannot be read, or [`SceneError::Changed`].
     pub fn load(&self) -> Result<Document, SceneError> {
         let document = Document::read(&self.path)?;
         let now = fingerprint(&document);

@@ -130,7 +130,7 @@ fn an_episode_is_brought_back_as_it_stood() {
     let mut again = bring_back(&spec, &entries, &hands, 0);
     assert_eq!(said(&mut again), said(&mut session));
     assert_eq!(again.state_hash(), session.state_hash());
-    // Both continue, and are restored once more.
+    // Both continue, and are restored again.
     hands.pass(900);
     for session in [&mut session, &mut again] {
         command(session, raise_hand(25));

@@ -1,4 +1,4 @@
-//! Tests of plans: several commands in one call have the same effect as separate calls, also in a replay.
+//! Tests of plans. Several commands in one call have the same effect as separate calls, also in a replay.
 
 use serde_json::json;
 use tandem_episodes::{A, B, Session};
@@ -147,7 +147,7 @@ fn a_command_lasts_until_what_it_expects_holds() {
         (command["expects"], command["until"]) = (json!({ "arrived": true }), json!(true));
         command
     };
-    // A wrist that has arrived at an intermediate target is only on its way.
+    // A wrist at an intermediate target has not reached its last target.
     let back = until(json!({ "tool": "move_wrists", "arguments": to([0.3, -0.3, 0.3], 60) }));
     let reply = plan(&mut session, "send_plan", json!({ "commands": [back] })).unwrap();
     assert_eq!((reply.stopped, reply.commands), (None, 1));
@@ -243,7 +243,7 @@ fn a_robot_that_did_nothing_is_not_told_of() {
     assert!(a.robot == "A" && a.pelvis_in_start.is_some(), "{a:?}");
 }
 
-/// B faces A, and goes away from it along A's x.
+/// B faces A, and walks away from it along A's x axis.
 #[test]
 fn a_place_in_the_room_is_the_same_for_every_robot() {
     let mut session = agentic();

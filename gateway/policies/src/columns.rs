@@ -13,10 +13,10 @@ use tandem_tools_spec::{
 
 use crate::poses::{POSE_LEN, RotationForm, pose_values};
 
-/// Some columns under one name.
+/// A range of columns, with its name.
 type Block = (String, Range<usize>);
 
-/// Blocks of a robot's state, in the order of [`state_values`], except those of its wrists.
+/// Blocks of a robot's state except the wrists, in the order of [`state_values`].
 const STATE: [(&str, Range<usize>); 17] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
@@ -43,7 +43,7 @@ const STATE_PELVIS: usize = STATE_GRAVITY + 3;
 const STATE_MOMENT: usize = STATE_PELVIS + 7;
 const STATE_RATES: usize = STATE_MOMENT + 3;
 const STATE_GYRO: usize = STATE_RATES + JOINTS;
-/// The base command is last.
+/// The last columns are the base command.
 const STATE_BASE: usize = STATE_GYRO + 6;
 const STATE_LEN: usize = STATE_BASE + 4;
 
@@ -58,18 +58,18 @@ const ACTION: [(&str, Range<usize>); 7] = [
     ("row", 0..ACTION_ROW_LEN),
 ];
 const ACTION_BASE: usize = 31;
-/// After a row, a policy may command wrist poses.
+/// After the columns of an action row, a policy may command wrist poses.
 const ACTION_WRISTS: [usize; 2] = [ACTION_ROW_LEN, ACTION_ROW_LEN + POSE_LEN];
-/// After these, it may command the setpoints of all motors, in the order of `send_joint_drives`.
+/// After the wrist poses, it may command the setpoints of all motors, in the order of `send_joint_drives`.
 const ACTION_MOTORS: usize = ACTION_ROW_LEN + 2 * POSE_LEN;
 /// Number of columns that a policy may command.
 pub const ACTION_LEN: usize = ACTION_MOTORS + DRIVE_ROW_LEN;
-/// Blocks of motors' setpoints, each with the 43 joints.
+/// Names of the blocks of motor setpoints. Each block has 43 columns, one for each joint.
 const MOTORS: [&str; 5] = ["motor_position", "motor_velocity", "motor_kp", "motor_kd", "motor_torque"];
 
 /// Names of the wrists, left before right throughout.
 pub const WRISTS: [&str; 2] = ["left_wrist", "right_wrist"];
-/// Suffixes of a wrist's name for the parts of its pose, with their ranges in the pose.
+/// Suffixes of a wrist's name for parts of the wrist's pose, with the ranges of these parts in the pose.
 const WRIST_PARTS: [(&str, Range<usize>); 6] = [
     ("", 0..7),
     ("_position", 0..3),
@@ -81,10 +81,10 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
 
 /// Returns the full state of a robot, or `None` if a part of the state is withheld.
 ///
-/// The order is: joints in rad; the pose of each wrist in the pelvis frame; the direction of gravity; the
-/// pelvis by the robot's own odometry (x, y, z in m and w, x, y, z); the moment of the episode; joint
-/// velocities, gyro and specific force, or zeros if they were not requested; the base command in force in
-/// the order of [`BASE_COLUMNS`].
+/// The order is: joints in rad; the pose of each wrist in the pelvis frame; the direction of gravity in the
+/// pelvis frame; the pose of the pelvis by the robot's odometry (x, y, z in m and w, x, y, z); the moment of
+/// the episode; joint velocities, gyro and specific force, or zeros if they were not requested; the present
+/// base command in the order of [`BASE_COLUMNS`].
 pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f64>> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
@@ -99,7 +99,7 @@ pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f6
     Some(sensed.chain(moment).chain(rates(state.samples.as_ref())).chain(base).collect())
 }
 
-/// Returns the latest joint velocities, gyro and specific force.
+/// Returns the latest joint velocities, gyro and specific force; zeros without samples.
 fn rates(samples: Option<&SensorSamples>) -> Vec<f64> {
     let latest = samples.and_then(|samples| {
         let rates = samples.joint_velocities_rad_s.last()?.iter().copied();
@@ -108,23 +108,23 @@ fn rates(samples: Option<&SensorSamples>) -> Vec<f64> {
     latest.unwrap_or_else(|| vec![0.0; STATE_BASE - STATE_RATES])
 }
 
-/// Moment of an episode, for policies with memory on servers that may have several episodes at once.
+/// Time in an episode, for policies with memory on servers that may play several episodes in parallel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EpisodeMoment {
-    /// Number of the episode, above 0, that a 32-bit float represents exactly.
+    /// Number of the episode, at least 1, which a 32-bit float represents exactly.
     pub episode: u32,
-    /// Control steps since the episode began.
+    /// Number of control steps since the episode began.
     pub done_steps: f64,
     /// True for the first request of the episode.
     pub is_first: bool,
 }
 
 impl EpisodeMoment {
-    /// Returns the number of an episode. Millions count the task, from 1, and the rest is the seed. Tasks
-    /// from the user's own files have higher numbers by hash.
+    /// Returns the number of an episode. Its millions are the number of a built-in task, from 1, and the rest
+    /// is the seed. Tasks from users' files have higher numbers, which are derived from hashes.
     pub fn number_of(task: &Task, seed: u32) -> u32 {
         const SEEDS: u32 = 1_000_000;
-        /// First number that a float does not distinguish from the next one.
+        /// First integer that a 32-bit float does not distinguish from the next one.
         const END: u32 = 1 << 24;
         let built_in = tasks::built_in();
         let own_file = task.file_xxh3().filter(|_| task.suite().is_none());
@@ -141,23 +141,24 @@ impl EpisodeMoment {
     }
 }
 
-/// Returns zeros in the length of [`state_values`].
+/// Returns zeros, as many as [`state_values`] has values.
 pub fn blank_state_values() -> Vec<f64> {
     vec![0.0; STATE_LEN]
 }
 
-/// Returns the sensed pose of a wrist in the pelvis frame: x, y, z, w, x, y, z.
+/// Returns the sensed pose of a wrist in the pelvis frame: position x, y, z and quaternion w, x, y, z.
 pub fn sensed_wrist(state_values: &[f64], side: usize) -> &[f64] {
     &state_values[STATE_WRISTS[side]..][..7]
 }
 
-/// Returns the pose of the pelvis by the robot's own odometry, in the same form.
+/// Returns the pose of the pelvis in the start frame by the robot's odometry: position x, y, z and quaternion
+/// w, x, y, z.
 pub fn sensed_pelvis(state_values: &[f64]) -> &[f64] {
     &state_values[STATE_PELVIS..STATE_MOMENT]
 }
 
-/// Returns the row that holds a robot in its sensed state: arms, hands, waist and height unchanged, no
-/// walking.
+/// Returns the row that holds a robot in its sensed state. Arms, hands, waist and height remain unchanged,
+/// and the base does not walk.
 pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     let mut row = vec![0.0; ACTION_ROW_LEN];
     for (name, columns) in &ACTION {
@@ -170,24 +171,24 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     row
 }
 
-/// Returns true for a column of arms or waist, which inverse kinematics controls if wrist poses are
+/// Returns true for a column of arms or waist. Inverse kinematics controls these joints if wrist poses are
 /// commanded.
 pub fn is_of_arm_or_waist(column: usize) -> bool {
     let blocks = ["left_arm", "right_arm", "waist"];
     ACTION.iter().any(|(name, columns)| blocks.contains(name) && columns.contains(&column))
 }
 
-/// Returns the columns of a hand in an action row.
+/// Returns the columns of a hand's joints in an action row.
 pub fn hand(side: usize) -> Range<usize> {
     ACTION[2 + side].1.clone()
 }
 
-/// Returns the columns of all motors' setpoints among those that a policy may command.
+/// Returns the columns of all motor setpoints among those that a policy may command.
 pub fn motors() -> Range<usize> {
     ACTION_MOTORS..ACTION_LEN
 }
 
-/// Returns the columns of wrists' poses among those that a policy may command.
+/// Returns the columns of both wrist poses among those that a policy may command.
 pub fn wrists() -> Range<usize> {
     ACTION_ROW_LEN..ACTION_MOTORS
 }
@@ -197,14 +198,15 @@ pub fn wrist_position(side: usize) -> Range<usize> {
     ACTION_WRISTS[side]..ACTION_WRISTS[side] + 3
 }
 
-/// Returns the columns of a wrist's rotation in one form.
+/// Returns the columns of a wrist's rotation in this form, among those that a policy may command.
 pub fn wrist_rotation(side: usize, form: RotationForm) -> Range<usize> {
     let before = RotationForm::ALL.into_iter().take_while(|known| *known != form);
     let from = ACTION_WRISTS[side] + 3 + before.map(RotationForm::len).sum::<usize>();
     from..from + form.len()
 }
 
-/// Returns the wrist whose pose, or a part of it, is called `name`. Wrist joints count as joints.
+/// Returns the index of the wrist whose pose, or a part of it, is called `name`. Wrist joints are not
+/// included.
 pub fn wrist_named(name: &str) -> Option<usize> {
     let is_of = |wrist: &str| WRIST_PARTS.iter().any(|(part, _)| name.strip_prefix(wrist) == Some(*part));
     WRISTS.iter().position(|wrist| is_of(wrist))
@@ -215,8 +217,8 @@ pub fn state_range(name: &str) -> Result<Range<usize>, String> {
     range(name, &state_blocks(), &state_singles())
 }
 
-/// Returns the extra information in the state columns `columns` that the benchmark's own policies do not
-/// get.
+/// Returns the extra information in the state columns `columns`, which the benchmark withholds from its own
+/// policies.
 pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     let extra = [
         (ExtraInformation::Gravity, STATE_GRAVITY..STATE_PELVIS),
@@ -233,13 +235,13 @@ pub fn action_range(name: &str) -> Result<Range<usize>, String> {
     range(name, &action_blocks(), &action_singles())
 }
 
-/// Yields the blocks of an action row with their names, each column in one of them.
+/// Yields the blocks of an action row with their names. Each column is in exactly one block.
 pub fn row_blocks() -> impl Iterator<Item = (&'static str, Range<usize>)> {
     ACTION.into_iter().filter(|(_, columns)| *columns != (0..ACTION_ROW_LEN))
 }
 
-/// Returns the name of column number `column` that a policy may command; for a wrist, the name of the
-/// part, and for a motor that of the block.
+/// Returns the name of the command column with the index `column`. For a wrist, it is the name of the part of
+/// the pose; for a motor, the name of the block.
 pub fn action_name(column: usize) -> String {
     let single = action_singles().into_iter().find(|(_, at)| *at == column).map(|(name, _)| name);
     let parts = || wrist_blocks(ACTION_WRISTS).into_iter().filter(|(name, _)| !WRISTS.contains(&&**name));
@@ -259,7 +261,7 @@ fn action_blocks() -> Vec<Block> {
     own.chain(wrist_blocks(ACTION_WRISTS)).chain(motor_blocks()).chain([all_motors]).collect()
 }
 
-/// Yields the blocks of motors' setpoints, positions before velocities, kp, kd and torques.
+/// Yields the blocks of motor setpoints in the order: positions, velocities, kp, kd, torques.
 pub fn motor_blocks() -> impl Iterator<Item = Block> {
     let first = |index: usize| ACTION_MOTORS + index * JOINTS;
     MOTORS
@@ -268,7 +270,7 @@ pub fn motor_blocks() -> impl Iterator<Item = Block> {
         .map(move |(index, name)| ((*name).to_owned(), first(index)..first(index) + JOINTS))
 }
 
-/// Returns the blocks of wrists whose columns begin at `starts`.
+/// Returns the blocks of both wrists. The columns of each wrist begin at its entry in `starts`.
 fn wrist_blocks(starts: [usize; 2]) -> Vec<Block> {
     let of_wrist = |(wrist, start): (&str, usize)| {
         let block = |(part, columns): &(&str, Range<usize>)| {
@@ -397,8 +399,8 @@ mod tests {
 
     #[test]
     fn columns_are_those_of_the_contract() {
-        // The blocks of arms, hands and waist have different orders in states and rows, but the same
-        // joints.
+        // The blocks of arms, hands and waist are in different orders in states and rows, but contain the
+        // same joints.
         let action: Vec<String> = (0..ACTION_LEN).map(action_name).collect();
         assert!(action.iter().all(|name| !name.is_empty()), "{action:?}");
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Reasons why a policy server gives no action. Each message states the received and the expected value.
+//! Reasons why a policy server yields no action. Each message states the received and the expected value.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use tandem_episodes::printable;
 /// A failure of a policy server.
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
-    /// No server listens at the address yet.
+    /// No server is listening at the address yet.
     #[error("no policy answers at {url}: {reason}")]
     Unreachable { url: String, reason: String },
     /// The connection to the server has broken.
@@ -22,21 +22,21 @@ pub enum RemoteError {
     /// The server's message violates its protocol.
     #[error("the policy at {url} sent what cannot be read: {reason}")]
     Unreadable { url: String, reason: String },
-    /// The server's answer does not fit the map.
+    /// The server's answer does not conform to the map.
     #[error("the policy's answer does not fit its map: {0}")]
     Misfit(String),
 }
 
 impl RemoteError {
-    /// Returns advice for failures that would repeat in the next episode. `connect_s` is the time limit
-    /// for connecting.
+    /// Returns advice for failures that would recur in the next episode. `connect_s` is the time limit for
+    /// connecting, in seconds.
     pub fn remedy(&self, connect_s: f64) -> Option<String> {
         match self {
             RemoteError::Unreachable { .. } => Some(format!(
                 "Start its server, or name in --policy where it listens (a server that starts slowly is waited for longer with a \
                  greater connect_s in its policy map, now {connect_s} s)"
             )),
-            // No setting of a map makes a first answer arrive.
+            // No setting of a map can make the first answer faster.
             RemoteError::Slow { .. } => {
                 Some("That is as long as a first answer may take; see what its server does".into())
             }
@@ -48,8 +48,8 @@ impl RemoteError {
     }
 }
 
-/// Returns the most informative line of a text, shortened: the last line of a Python traceback, otherwise
-/// the first. Of an HTML page it returns the beginning, because its first line is a tag.
+/// Returns the most informative line of a text, shortened: the last line of a Python traceback, otherwise the
+/// first line. For an HTML page, it returns the beginning, because its first line is a tag.
 pub fn gist(text: &str) -> String {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let line = match (text.starts_with("Traceback"), text.trim_start().starts_with('<')) {

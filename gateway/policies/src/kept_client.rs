@@ -1,5 +1,5 @@
-//! Connections to servers that are kept alive between requests, while other policies, people or the
-//! simulator take their time. Servers drop a client that answers no ping for long.
+//! Connections to servers that are kept alive between requests, while other policies, people or the simulator
+//! are active. Servers disconnect a client that leaves pings unanswered for too long.
 
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard, TryLockError},
@@ -9,8 +9,8 @@ use std::{
 
 use crate::client::PolicyClient;
 
-/// Maximum time without a message to the server. Python's websockets pings after 20 s and closes after
-/// another 20 s.
+/// Maximum time without a message to the server. The Python package websockets sends a ping after 20 s and
+/// closes the connection after another 20 s.
 const LONGEST_SILENCE: Duration = Duration::from_secs(5);
 
 /// A client whose connection stays open while this value exists, even if it is idle.
@@ -43,7 +43,7 @@ impl KeptClient {
             Arc::new(SharedClient { client, is_dropped: Mutex::new(false), dropped: Condvar::new() });
         let kept = shared.clone();
         let keeper = thread::Builder::new().name("policy's connection".into());
-        // If no thread can be started, pings of the server stay unanswered while the client is idle.
+        // If no thread can be started, the server's pings are not answered while the client is idle.
         let keeper = keeper.spawn(move || kept.keep_alive(every)).ok();
         KeptClient { shared, keeper }
     }
@@ -58,7 +58,7 @@ impl KeptClient {
 }
 
 impl SharedClient {
-    /// Sends a keep-alive whenever the client has been idle for `every`.
+    /// Sends a keep-alive message whenever the client has been idle for `every`.
     fn keep_alive(&self, every: Duration) {
         loop {
             let waited = self.dropped.wait_timeout_while(self.is_dropped(), every, |is_dropped| !*is_dropped);
@@ -80,7 +80,7 @@ impl SharedClient {
     }
 
     fn is_dropped(&self) -> MutexGuard<'_, bool> {
-        // Nothing panics while it holds the lock.
+        // No thread panics while it holds the lock.
         self.is_dropped.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
@@ -89,7 +89,7 @@ impl Drop for KeptClient {
     fn drop(&mut self) {
         *self.shared.is_dropped() = true;
         self.shared.dropped.notify_all();
-        // This makes the connection close before `drop` returns.
+        // The connection closes before `drop` returns.
         self.keeper.take().map(JoinHandle::join);
     }
 }
@@ -104,7 +104,7 @@ mod tests {
         values::{ReplyValue, RequestValue},
     };
 
-    /// A client that reports every keep-alive.
+    /// A client that reports every keep-alive message.
     struct Beaten(mpsc::Sender<()>);
 
     impl PolicyClient for Beaten {

@@ -1,5 +1,5 @@
-//! Learned policies as servers; Tandem is their client. A map assigns the images and values of requests and
-//! answers to keys.
+//! Learned policies that run on servers, of which Tandem is a client. A map assigns keys to the images and
+//! values in requests and answers.
 
 mod action;
 mod client;
@@ -44,27 +44,27 @@ use map::AnswerScope;
 use policy_session::PolicySession;
 use request::TaskInstructions;
 
-/// A learned policy behind one socket, or behind one socket per robot.
+/// A learned policy on one server, or on one server per robot.
 #[derive(Debug)]
 pub struct RemotePolicy {
     protocol: PolicyProtocol,
-    /// One server for all robots, or one for each in the task's order.
+    /// One server for all robots, or one for each robot in the task's order.
     servers: Vec<PolicyAddress>,
     map: PolicyMap,
-    /// Start times of the waits of episodes that are still connecting.
+    /// Start times of connecting, for episodes that are not connected yet.
     waits: Mutex<Vec<Instant>>,
     /// Number of episodes played with a hidden seed.
     untold: AtomicU32,
 }
 
 impl RemotePolicy {
-    /// Creates the policy at `urls`, with requests in the form of `map`.
+    /// Creates the policy at `urls`, with requests in the format of `map`.
     pub fn new(protocol: PolicyProtocol, urls: Vec<String>, map: PolicyMap) -> RemotePolicy {
         let servers = urls.into_iter().map(|url| PolicyAddress { url, key: None }).collect();
         RemotePolicy { protocol, servers, map, waits: Mutex::default(), untold: AtomicU32::default() }
     }
 
-    /// Sets the key that the servers require. Only encrypted or local connections may carry it.
+    /// Sets the key that the servers require. It may only be sent over encrypted or local connections.
     pub fn with_key(mut self, key: Option<PolicyKey>) -> Result<RemotePolicy, PolicyKeyError> {
         for server in &mut self.servers {
             server.key = key.clone();
@@ -85,7 +85,7 @@ impl RemotePolicy {
     }
 
     fn waits(&self) -> MutexGuard<'_, Vec<Instant>> {
-        // Nothing panics while it holds the lock.
+        // No thread panics while it holds the lock.
         self.waits.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
@@ -105,8 +105,8 @@ impl RemotePolicy {
         session.map_err(|failures| self.not_opened(&failures))
     }
 
-    /// Returns the error for an episode that was not played. A missing server affects every other episode
-    /// as well.
+    /// Returns the error for an episode that was not played. A missing server also affects all other
+    /// episodes.
     fn not_opened(&self, failures: &[RemoteError]) -> PlayError {
         let reasons: Vec<String> = failures.iter().map(RemoteError::to_string).collect();
         let reasons = reasons.join("; ");
@@ -116,7 +116,7 @@ impl RemotePolicy {
         }
     }
 
-    /// Checks that the number of servers fits the task and the map.
+    /// Checks that the number of servers is valid for the task and the map.
     fn check(&self, task: &Task) -> Result<(), String> {
         let (servers, robots) = (self.servers.len(), task.robots.len());
         match (servers, self.map.answer) {

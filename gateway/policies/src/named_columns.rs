@@ -1,4 +1,4 @@
-//! Columns that a policy map names. A name is resolved once, when the map is read.
+//! Columns that a policy map names. Names are resolved once, when the map is read.
 
 use std::{marker::PhantomData, ops::Range};
 
@@ -8,15 +8,15 @@ use crate::columns::{action_range, state_range};
 
 /// A row whose columns have names.
 pub trait NamedRow {
-    /// Returns the columns called `name`, or the names that exist.
+    /// Returns the columns called `name`, or else the names that exist.
     fn find(name: &str) -> Result<Range<usize>, String>;
 }
 
-/// The row of a robot's state.
+/// The row with a robot's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StateRow;
 
-/// The row of everything that a policy may command.
+/// The row with all columns that a policy may command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommandRow;
 
@@ -55,7 +55,7 @@ impl<R> From<NamedColumns<R>> for String {
     }
 }
 
-/// Returns the columns under all of `names`, in their order.
+/// Returns the columns of all `names`, in the same order.
 pub fn joined<R>(names: &[NamedColumns<R>]) -> Vec<usize> {
     names.iter().flat_map(|named| named.columns.clone()).collect()
 }

@@ -1,5 +1,5 @@
-//! A policy session: the servers of one policy, connected for one episode. It observes, requests actions
-//! and executes them until the episode is over.
+//! A policy session: connections to the servers of one policy for one episode. The session observes, requests
+//! actions and executes them until the episode is over.
 
 use std::{
     panic::resume_unwind,
@@ -18,7 +18,7 @@ use crate::{
     request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
 };
 
-/// Time limit for the first answer, during which models are compiled. No clock of an episode runs yet.
+/// Time limit for the first answer, during which models are compiled. The episode's clock is not running yet.
 const FIRST_ANSWER: Duration = Duration::from_secs(600);
 
 /// Interval between attempts to connect to a server that is not listening yet.
@@ -27,19 +27,19 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 /// Connected servers of a policy. Each of them has answered once.
 pub struct PolicySession<'a> {
     plan: QueryPlan<'a>,
-    /// One client for all robots, or one for each.
+    /// One client for all robots, or one for each robot.
     clients: Vec<KeptClient>,
     /// Maximum number of control steps per command.
     most_steps: usize,
 }
 
 impl<'a> PolicySession<'a> {
-    /// Connects to the servers at `addresses` in parallel, waiting for those that are not there yet.
-    /// Probes each with black images and zeros.
+    /// Connects to the servers at `addresses` in parallel, and waits for servers that are not available yet.
+    /// Probes each server with black images and zeros.
     ///
     /// # Errors
     ///
-    /// Returns the failure of each server that fails.
+    /// Returns the errors of all servers that fail.
     pub fn open(
         protocol: PolicyProtocol,
         addresses: &[PolicyAddress],
@@ -108,8 +108,8 @@ impl<'a> PolicySession<'a> {
         }
     }
 
-    /// Requests the actions of all robots: one after another from a shared policy, in parallel from
-    /// separate ones.
+    /// Requests the actions of all robots: sequentially from a shared server, in parallel from separate
+    /// servers.
     fn decide(
         &mut self,
         shown: &[&PolicyObservation],
@@ -136,12 +136,12 @@ impl<'a> PolicySession<'a> {
     }
 }
 
-/// Returns the result of a thread; its panic continues here.
+/// Returns the result of a thread. If the thread has panicked, resumes its panic.
 fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-/// Requests and their robots, as the map defines them.
+/// Requests of the map and the robots that each request is for.
 struct QueryPlan<'a> {
     map: &'a PolicyMap,
     instructions: TaskInstructions,
@@ -183,7 +183,7 @@ impl QueryPlan<'_> {
     }
 }
 
-/// Retries until the deadline while no server listens, each time with the remaining time.
+/// Retries while no server listens, until the deadline. Each attempt gets the remaining time.
 fn retry_until<T>(
     deadline: Instant,
     mut attempt: impl FnMut(Duration) -> Result<T, RemoteError>,

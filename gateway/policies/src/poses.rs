@@ -1,11 +1,11 @@
-//! Poses in the forms that policies use: a position, and a rotation in one of several forms.
+//! Poses in the formats that policies use: a position, and a rotation in one of several forms.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Length below which a vector has no direction.
+/// Length below which a vector has no usable direction.
 const SHORTEST: f64 = 1e-6;
 
-/// Length of a pose: x, y, z in m, then the rotation in each form of [`RotationForm::ALL`].
+/// Number of values in a pose: x, y, z in m, then the rotation in each form of [`RotationForm::ALL`].
 pub const POSE_LEN: usize = 3 + 4 + 4 + 6 + 6;
 
 /// Representation of a rotation.
@@ -18,7 +18,7 @@ pub enum RotationForm {
     /// The first two columns of the matrix, as in Zhou et al. 2019, "On the Continuity of Rotation
     /// Representations".
     Columns,
-    /// The first two rows of the matrix, as `matrix_to_rotation_6d` of PyTorch3D.
+    /// The first two rows of the matrix, like `matrix_to_rotation_6d` of PyTorch3D.
     Rows,
 }
 
@@ -30,7 +30,7 @@ impl RotationForm {
         RotationForm::Rows,
     ];
 
-    /// Returns its number of values.
+    /// Returns the number of values.
     pub fn len(self) -> usize {
         match self {
             RotationForm::QuaternionWxyz | RotationForm::QuaternionXyzw => 4,
@@ -64,8 +64,9 @@ impl RotationForm {
     }
 }
 
-/// Returns the Gram-Schmidt orthogonalization of two vectors: the first keeps its direction, the second
-/// its orthogonal part, and the third follows.
+/// Returns the rotation from two vectors by Gram-Schmidt orthogonalization. The first axis has the first
+/// vector's direction. The second axis is the part of the second vector orthogonal to it. The third axis
+/// follows.
 fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
     let &[x0, x1, x2, y0, y1, y2] = values else { return None };
     let x = Vector3::new(x0, x1, x2).try_normalize(SHORTEST)?;
@@ -75,7 +76,7 @@ fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
     Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
 }
 
-/// Returns a pose with its rotation in all forms: [`POSE_LEN`] numbers.
+/// Returns the [`POSE_LEN`] values of a pose, with its rotation in all forms.
 pub fn pose_values(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Vec<f64> {
     let rotation = RotationForm::QuaternionWxyz.read(&quaternion_wxyz).unwrap_or_default();
     let [_, derived @ ..] = RotationForm::ALL;
@@ -83,7 +84,8 @@ pub fn pose_values(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Vec<f64> 
     position_m.into_iter().chain(quaternion_wxyz).chain(derived).collect()
 }
 
-/// Returns the pose that begins with x, y, z, w, x, y, z. A zero quaternion means no rotation.
+/// Returns the pose from values that begin with position x, y, z and quaternion w, x, y, z. A zero quaternion
+/// means no rotation.
 pub fn pose_of(values: &[f64]) -> Isometry3<f64> {
     let rotation = RotationForm::QuaternionWxyz.read(&values[3..7]).unwrap_or_default();
     Isometry3::from_parts(Translation3::new(values[0], values[1], values[2]), rotation)
@@ -112,7 +114,7 @@ mod tests {
         assert!(pose.rotation.angle_to(&rotation) < 1e-9 && pose.translation.vector.y == 2.0);
     }
 
-    /// A quarter turn about z takes x to y and y to -x.
+    /// A quarter turn about z rotates x to y and y to -x.
     #[test]
     fn six_numbers_are_columns_or_rows() {
         let quarter = UnitQuaternion::from_scaled_axis(Vector3::z() * std::f64::consts::FRAC_PI_2);

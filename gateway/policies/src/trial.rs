@@ -1,5 +1,5 @@
-//! Trial of a map with a made-up observation and answer. It reports the request that a policy would get
-//! and the effect of its answer.
+//! Trial of a map with a synthetic observation and answer. It reports the request that a policy would get and
+//! the effect of its answer.
 
 use std::collections::BTreeMap;
 
@@ -20,13 +20,13 @@ use crate::{
     values::{ReplyValue, RequestValue},
 };
 
-/// Rows of a made-up answer if the map does not fix their number.
+/// Number of rows of a synthetic answer if the map does not specify it.
 const ROWS: usize = 10;
-/// Maximum rows of a made-up answer if the map does not fix their number; policies answer with 8 to 100
+/// Maximum number of rows of a synthetic answer if the map does not specify it. Policies answer with 8 to 100
 /// rows.
 const MAX_TRIAL_ROWS: usize = 100;
 
-/// Tries `map` with each number of robots for which there are tasks, and returns the report.
+/// Tries `map` with each number of robots that tasks have, and returns the report.
 pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
     check_execute(map)?;
     let by_robots: BTreeMap<usize, &Task> =
@@ -41,7 +41,7 @@ struct MapTrial<'a> {
     task: &'a Task,
     instructions: TaskInstructions,
     observation: PolicyObservation,
-    /// Robots of the first request.
+    /// Indices of the robots in the first request.
     asked: Vec<usize>,
     chunks: Vec<RobotRows>,
 }
@@ -54,7 +54,7 @@ struct KeyLine {
 }
 
 impl<'a> MapTrial<'a> {
-    /// Makes up an answer to every request and parses it as a policy's.
+    /// Creates a synthetic answer to every request and parses it like a policy's answer.
     fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
         let (instructions, robots) = (TaskInstructions::of(task, TaskWords::of(task)), task.robots.len());
         let observation = PolicyObservation::blank(robots);
@@ -139,7 +139,7 @@ impl<'a> MapTrial<'a> {
         }
     }
 
-    /// Describes the columns of an answer under `key` and the joints that they command.
+    /// Describes the columns under `key` in an answer and the joints that they command.
     fn answer_lines(&self, key: &str, names: &[NamedColumns<CommandRow>]) -> Vec<KeyLine> {
         let robots: Vec<&String> = self.asked.iter().map(|robot| &self.instructions.robots[*robot]).collect();
         let rows = self.map.chunk.rows.map_or("rows".to_owned(), |rows| rows.to_string());
@@ -168,7 +168,7 @@ impl<'a> MapTrial<'a> {
         }
     }
 
-    /// Describes how a column is interpreted if it is not an absolute target.
+    /// Describes the interpretation of a column that is not an absolute target.
     fn understood(&self, named: &NamedColumns<CommandRow>) -> String {
         let columns = named.columns.clone();
         let delta = self.map.delta();
@@ -194,7 +194,7 @@ impl<'a> MapTrial<'a> {
         told.into()
     }
 
-    /// Describes the calls that a made-up answer becomes.
+    /// Describes the calls that result from a synthetic answer.
     fn execution(&self) -> String {
         let rows = executed_rows(&self.chunks);
         let calls = |protocol: Protocol| {
@@ -226,7 +226,7 @@ impl<'a> MapTrial<'a> {
         )
     }
 
-    /// Describes a requirement on the number of rows that the map does not state.
+    /// Describes a requirement on the number of rows that the map does not state explicitly.
     fn made_up_rows(&self) -> String {
         match (self.map.chunk.rows, self.map.chunk.execute) {
             (None, Some(execute)) => {
@@ -266,7 +266,7 @@ impl<'a> MapTrial<'a> {
     }
 }
 
-/// Checks that a made-up answer can have the number of rows that the map executes.
+/// Checks that a synthetic answer can have as many rows as the map executes.
 fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
     match (map.chunk.rows, map.chunk.execute) {
         (None, Some(execute)) if execute > MAX_TRIAL_ROWS => Err(RemoteError::Misfit(format!(
@@ -278,7 +278,7 @@ fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
     }
 }
 
-/// Makes up an answer of the expected shape with distinguishable columns: 0.01, 0.02 and so on.
+/// Creates an answer of the expected shape with distinguishable columns: 0.01, 0.02 and so on.
 fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usize]) -> ReplyValue {
     let rows = map.chunk.rows.or(map.chunk.execute).unwrap_or(ROWS);
     let mut answer = ReplyValue::Map(Vec::new());
@@ -299,7 +299,7 @@ fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usi
     answer
 }
 
-/// Lists keys with their values; keys in nested maps include their path.
+/// Lists keys with their values. Keys in nested maps include their path.
 fn flatten<'a>(
     before: &str,
     entries: &'a [(String, RequestValue)],
@@ -345,7 +345,7 @@ fn of_robot(robot: &str, robots: &[&String]) -> String {
     }
 }
 
-/// Returns the command of the first robot without empty fields, and only the first row.
+/// Returns the first robot's command without empty fields and with only the first row.
 fn told_first(call: &Value) -> Value {
     let mut entry = call["robots"][0].clone();
     if let Some(fields) = entry.as_object_mut() {

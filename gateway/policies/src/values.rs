@@ -1,6 +1,6 @@
 //! Values of requests and answers, independent of the protocol.
 
-/// An array as in numpy, in C order.
+/// An array with numpy's C order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
     pub shape: Vec<usize>,
@@ -15,7 +15,7 @@ pub enum Elements {
 }
 
 impl Array {
-    /// Stacks arrays of one shape along a new first axis.
+    /// Stacks arrays of the same shape along a new first axis.
     pub fn stack(arrays: Vec<Array>) -> Array {
         let shape = arrays.first().map(|array| array.shape.clone()).unwrap_or_default();
         let shape = std::iter::once(arrays.len()).chain(shape).collect();
@@ -30,7 +30,7 @@ impl Array {
         Array { shape, elements: joined.unwrap_or(Elements::Floats(Vec::new())) }
     }
 
-    /// Returns numpy's name for the type of the elements.
+    /// Returns the numpy name of the element type.
     pub fn dtype(&self) -> &'static str {
         match self.elements {
             Elements::Bytes(_) => "|u1",
@@ -56,13 +56,13 @@ pub enum RequestValue {
     List(Vec<RequestValue>),
 }
 
-/// Splits a key into its parts: `video > ego_view` is `ego_view` in the map `video`.
+/// Splits a key into its parts: `video > ego_view` is the key `ego_view` in the map `video`.
 pub fn path(key: &str) -> impl Iterator<Item = &str> {
     key.split('>').map(str::trim).filter(|part| !part.is_empty())
 }
 
 impl RequestValue {
-    /// Stores `value` under the path `key`, creating the maps on the way.
+    /// Stores `value` under the path `key`. Missing maps are created.
     pub fn put(&mut self, key: &str, value: RequestValue) {
         let mut at = self;
         for part in path(key) {
@@ -86,7 +86,7 @@ pub enum ReplyValue {
         values: Vec<f64>,
     },
     Text(String),
-    /// A value of any other type, described in words.
+    /// A value of any other type, with a description.
     Other(String),
 }
 
@@ -96,7 +96,7 @@ impl ReplyValue {
         ReplyValue::Array { shape: Vec::new(), values: vec![value] }
     }
 
-    /// Converts a list. It becomes an array if all items are arrays of one shape.
+    /// Converts a list of values. It becomes an array if all items are arrays of the same shape.
     pub fn list(items: Vec<ReplyValue>) -> ReplyValue {
         let (length, mut joined, mut inner) = (items.len(), Vec::new(), None);
         for item in items {
@@ -112,11 +112,11 @@ impl ReplyValue {
         ReplyValue::Array { shape, values: joined }
     }
 
-    /// Reads an array from numpy's bytes.
+    /// Decodes an array from numpy's bytes.
     ///
     /// # Errors
     ///
-    /// Returns a description of the mistakes in the values.
+    /// Returns a description of the invalid values.
     pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<ReplyValue, String> {
         let values: Vec<f64> = match dtype {
             "<f4" => read(bytes, |four| f32::from_le_bytes(four).into()),
@@ -133,8 +133,7 @@ impl ReplyValue {
         }
     }
 
-    /// Stores `value` under the path `key`, creating the maps on the way. An empty path replaces the
-    /// whole value.
+    /// Stores `value` under the path `key`. Missing maps are created. An empty path replaces the whole value.
     pub fn put(&mut self, key: &str, value: ReplyValue) {
         let mut at = self;
         for part in path(key) {
@@ -151,7 +150,7 @@ impl ReplyValue {
         *at = value;
     }
 
-    /// Returns the value at the path `key`; an empty path means the whole value.
+    /// Returns the value under the path `key`. An empty path means the whole value.
     pub fn at(&self, key: &str) -> Option<&ReplyValue> {
         path(key).try_fold(self, |at, part| match at {
             ReplyValue::Map(entries) => entries.iter().find(|(name, _)| name == part).map(|(_, reply)| reply),
@@ -159,7 +158,7 @@ impl ReplyValue {
         })
     }
 
-    /// Describes the value in words for the author of a map.
+    /// Describes the value for the author of a map.
     pub fn describe(&self) -> String {
         match self {
             ReplyValue::Map(entries) if entries.is_empty() => "an empty map".into(),

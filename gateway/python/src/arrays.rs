@@ -7,9 +7,9 @@ use tandem_episodes::joint_names;
 use tandem_sim::{Pose, RobotCommand, RobotStep, UPPER, Vector};
 use tandem_tools_spec::{Assistance, BASE_COLUMNS, DRIVE_BLOCKS};
 
-/// Colours of an image: height by width by red, green, blue.
+/// Colour image: height by width by red, green, blue.
 pub type Colours<'py> = Bound<'py, PyArray3<u8>>;
-/// Distances along the optical axis: height by width, in metres.
+/// Depth image along the optical axis: height by width, in metres.
 pub type Depths<'py> = Bound<'py, PyArray2<f32>>;
 
 /// Components of a pose.
@@ -57,7 +57,7 @@ pub fn state_row(robot: &RobotStep, assistance: Assistance, row: &mut Vec<f32>) 
     }
 }
 
-/// Returns a pose as x, y, z in m and w, x, y, z.
+/// Returns a pose as position x, y, z in m and quaternion w, x, y, z.
 pub fn pose_row(pose: &Pose) -> [f32; 7] {
     let (t, r) = (pose.translation, pose.rotation);
     [t.x, t.y, t.z, r.w, r.x, r.y, r.z]
@@ -99,7 +99,7 @@ pub fn state_columns() -> Vec<String> {
     state_names(Assistance::Full)
 }
 
-/// Creates an array of this shape from the numbers, which are copied once.
+/// Creates an array of this shape from the numbers. They are copied once.
 pub fn shaped<'py, T: Element, const N: usize>(
     py: Python<'py>,
     numbers: &[T],

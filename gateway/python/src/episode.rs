@@ -22,7 +22,7 @@ use tandem_tools_spec::{
 use crate::arrays::{Colours, Depths, shaped, state_names, state_row};
 use crate::refusal::{failed, forked, refused};
 
-/// An episode from its start to its result. It may be used from any thread; concurrent calls are
+/// An episode from its start to its result. It may be used from any thread, but concurrent calls are
 /// serialized.
 #[pyclass(frozen, name = "Episode", module = "tandem._native")]
 pub struct NativeEpisode {
@@ -31,17 +31,17 @@ pub struct NativeEpisode {
     course: Course,
     assistance: Assistance,
     disclosure: Disclosure,
-    /// Id of the process that made it. A forked process has neither the threads nor the files of its
-    /// parent.
+    /// Id of the process that created the episode. A forked process has neither the threads nor the files of
+    /// its parent.
     process: u32,
-    /// Set once the policy has to stop, from a thread other than the policy's.
+    /// Set by another thread once the policy has to stop.
     interrupted: Arc<AtomicBool>,
 }
 
-/// Purpose of an episode, which decides whether it may go back to an earlier moment.
+/// Purpose of an episode, which determines whether earlier states may be restored.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Course {
-    /// The caller's own episode, which may.
+    /// An episode of the caller, in which earlier states may be restored.
     Free,
     /// A recorded episode.
     Recorded,
@@ -50,7 +50,7 @@ pub enum Course {
 }
 
 impl Course {
-    /// Returns the reason why the episode only goes forward, if it does.
+    /// Returns the reason why no other state may be restored; `None` if it may.
     fn forward_only(self) -> Option<&'static str> {
         match self {
             Course::Free => None,
@@ -68,21 +68,21 @@ impl Course {
 /// State of an episode.
 enum Held {
     Open(Box<PanicGuard>),
-    /// Its result, if there is one.
+    /// The result, if there is one.
     Closed(Option<Box<ResultReply>>),
 }
 
-/// Snapshot of an episode, to which it can return.
+/// Snapshot of an episode, which can be restored.
 #[pyclass(frozen, module = "tandem._native")]
 pub struct Snapshot {
     checkpoint: Checkpoint,
 }
 
-/// Outcome of a step: executed steps, stop reason, simulated time, numbers of phases, fallen robots, and
-/// true at the end.
+/// Outcome of a step: number of executed steps, stop reason, simulated time in seconds, numbers of reached
+/// phases, falls of the robots, and true if the episode has ended.
 type Stepped = (u32, String, f64, Vec<String>, Vec<bool>, bool);
 
-/// States and calibrations as JSON, and each robot's images.
+/// States and calibrations as JSON, and the images of each robot.
 type Seen<'py> = (String, Vec<(Colours<'py>, Option<Depths<'py>>)>);
 
 impl NativeEpisode {
@@ -120,7 +120,7 @@ impl NativeEpisode {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Refuses requests in a forked process.
+    /// Returns an error in a forked process.
     fn check_process(&self, py: Python) -> PyResult<()> {
         match process::id() == self.process {
             true => Ok(()),
@@ -128,7 +128,7 @@ impl NativeEpisode {
         }
     }
 
-    /// Runs `work` on the session. Python's other threads run meanwhile.
+    /// Runs `work` on the session. Other Python threads run meanwhile.
     fn work<T: Send>(
         &self,
         py: Python,
@@ -145,7 +145,7 @@ impl NativeEpisode {
         worked.map_err(|error| refused(py, &error))
     }
 
-    /// Ends the episode, for a given reason if there is one, and closes its recording. The result stays.
+    /// Ends the episode, for the given reason if any, and closes its recording. The result remains available.
     pub fn end(&self, reason: Option<EndReason>) -> Result<ResultReply, HostingError> {
         let mut held = self.held();
         let result = match std::mem::replace(&mut *held, Held::Closed(None)) {
@@ -165,7 +165,7 @@ impl NativeEpisode {
 
 #[pymethods]
 impl NativeEpisode {
-    /// Starts an episode. `start` has the arguments of start_episode and `settings` those of a server,
+    /// Starts an episode. `start` contains the arguments of start_episode, and `settings` those of a server,
     /// both as JSON. Returns the episode with its briefing.
     #[staticmethod]
     fn start(
@@ -198,8 +198,8 @@ impl NativeEpisode {
         })
     }
 
-    /// Observes. Returns states and calibrations as JSON, and for each robot the colours and, on request,
-    /// the depth.
+    /// Observes all requested robots. Returns states and calibrations as JSON. For each robot, also returns
+    /// the colour image and, on request, the depth image.
     #[pyo3(signature = (arguments, depth))]
     fn observe<'py>(&self, py: Python<'py>, arguments: &str, depth: bool) -> PyResult<Seen<'py>> {
         let formats =
@@ -219,7 +219,7 @@ impl NativeEpisode {
         Ok((json!({ "time_s": seen.time_s, "states": states, "cameras": cameras }).to_string(), views))
     }
 
-    /// Returns the sensed state, a row for each robot.
+    /// Returns the sensed states, with one row per robot.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let numbers = self.work(py, |session| {
             let (assistance, step) = session.read_states()?;
@@ -235,7 +235,7 @@ impl NativeEpisode {
         self.work(py, |session| Ok(state_names(session.spec().assistance)))
     }
 
-    /// Executes rows of every robot: robots by steps by columns.
+    /// Executes action rows of all robots, given as robots by steps by columns.
     fn step(&self, py: Python, rows: PyReadonlyArray3<'_, f32>) -> PyResult<Stepped> {
         let rows = rows.as_array();
         let chunk = |(robot, rows): (&String, numpy::ndarray::ArrayView2<f32>)| JointChunk {
@@ -272,7 +272,7 @@ impl NativeEpisode {
         self.work(py, |session| session.checkpoint()).map(|checkpoint| Snapshot { checkpoint })
     }
 
-    /// Moves the episode to the moment of a snapshot, back or forward.
+    /// Restores the state of a snapshot, which may be earlier or later.
     fn restore(&self, py: Python, snapshot: &Snapshot) -> PyResult<()> {
         if let Some(way) = self.course.forward_only() {
             return Err(failed(py, &way));
@@ -289,7 +289,7 @@ impl NativeEpisode {
         self.work(py, |session| Ok(session.state_hash()))
     }
 
-    /// Returns the end reason by the contract's name, if the episode has ended.
+    /// Returns the contract's name of the reason for the episode's end; `None` before the end.
     fn ended(&self, py: Python) -> PyResult<Option<String>> {
         Ok(py.detach(|| match &*self.held() {
             Held::Open(guard) => guard.ended().map(name_of),
@@ -297,19 +297,19 @@ impl NativeEpisode {
         }))
     }
 
-    /// Ends the episode, closes its recording, and returns the result as JSON. Repeated calls return the
-    /// same.
+    /// Ends the episode, closes its recording, and returns the result as JSON. Repeated calls return the same
+    /// result.
     fn close(&self, py: Python) -> PyResult<String> {
         self.check_process(py)?;
         let result = py.detach(|| self.end(None)).map_err(|error| refused(py, &error))?;
-        // The caller's own episode has no secrets.
+        // An episode of the caller has no secrets.
         let told = if self.course == Course::Scored { result.disclosed(self.disclosure) } else { result };
         Ok(json!(told).to_string())
     }
 }
 
-/// Closes the episode, so that its files are whole. In a forked process it is leaked, because its files
-/// are the parent's.
+/// Closes the episode, so that its files are complete. In a forked process, the episode is leaked, because
+/// its files belong to the parent.
 impl Drop for NativeEpisode {
     fn drop(&mut self) {
         if process::id() == self.process {
@@ -323,13 +323,13 @@ impl Drop for NativeEpisode {
 
 #[pymethods]
 impl Snapshot {
-    /// Returns the snapshot in the format of its file. The same build can read it.
+    /// Returns the snapshot in its file format, which the same build can read.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| self.checkpoint.to_bytes()).map_err(|error| refused(py, &error.into()))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Reads the output of `to_bytes`.
+    /// Reads a snapshot from the output of `to_bytes`.
     #[staticmethod]
     fn from_bytes(py: Python, bytes: &[u8]) -> PyResult<Snapshot> {
         let read = py.detach(|| Checkpoint::from_bytes(bytes, Path::new("snapshot")));
@@ -337,7 +337,7 @@ impl Snapshot {
     }
 }
 
-/// Reason why an episode does not begin.
+/// Reason why an episode cannot begin.
 enum StartProblem {
     Refused(HostingError),
     Settings(String),

@@ -20,18 +20,18 @@ use tandem_tools_spec::Protocol;
 use crate::players::{PlayedBy, PythonPolicy};
 use crate::refusal::failed;
 
-/// Interval between two checks for a signal.
+/// Interval between two checks for signals.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Plays episodes by `play` and returns the evaluation as JSON.
+/// Plays episodes with `play` and returns the evaluation as JSON.
 ///
-/// `play` is called with each episode and its briefing as JSON. Without it, the player called `name`
-/// plays. If `play` has episodes played `elsewhere`, it is called with task, seed and a function that
-/// returns true once the user wants to stop. It returns true and the episode as JSON with the files of
-/// its recording, or false and the reason.
+/// `play` is called with each episode and its briefing as JSON. Without `play`, the player called `name`
+/// plays. With `elsewhere`, another process plays the episodes: `play` is called with task, seed and a
+/// function that returns true once the user wants to stop. It returns true and the episode as JSON with the
+/// files of its recording, or false and the reason.
 ///
-/// Existing results in `out` are not played again. `progress` is called with every episode's result as
-/// JSON, and true if it was played now. `existing_run` is the treatment of another run in `out`:
+/// Existing results in `out` are not played again. `progress` is called with the result of every episode as
+/// JSON, and true if it was played now. `existing_run` is the treatment of a different run in `out`:
 /// `refuse`, `resume_with_new_build` or `overwrite`. `seed_key` is the file with an evaluator's key.
 #[pyfunction]
 #[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere, existing_run, seed_key))]
@@ -77,7 +77,7 @@ pub fn demonstrations_folder(
     Ok(evaluation::default_folder(&plan, Some("demonstrations"), Path::new("runs")))
 }
 
-/// Returns the plan for these episodes, which are played in sequence and without recordings.
+/// Returns the plan for these episodes. They are played in sequence and without recordings.
 fn plan_of<'a>(
     py: Python,
     player: &'a PythonPolicy,
@@ -131,8 +131,8 @@ fn existing(py: Python, name: &str) -> PyResult<ExistingRun> {
     }
 }
 
-/// Plays on separate threads, while this one handles signals, because Python handles them only on its
-/// main thread.
+/// Plays on separate threads, while this thread handles signals, because Python handles them only on its main
+/// thread.
 fn play_all(
     py: Python,
     plan: &EvaluationPlan,
@@ -141,8 +141,8 @@ fn play_all(
     interrupted: &AtomicBool,
 ) -> PyResult<String> {
     let (done, outcome) = channel();
-    // Only this thread ever waits. Python's lock is released meanwhile, which requires a shareable
-    // receiver.
+    // Only this thread ever waits. It releases Python's lock meanwhile, which requires a receiver that can be
+    // shared.
     let outcome = Mutex::new(outcome);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -173,7 +173,7 @@ fn play_all(
     })
 }
 
-/// Reports an episode to the progress callback. Its errors do not affect the evaluation.
+/// Reports an episode to the progress callback. Errors of the callback do not affect the evaluation.
 fn tell(progress: Option<&Py<PyAny>>, event: EpisodeEvent) {
     let (played, now): (&PlayedEpisode, bool) = match event {
         EpisodeEvent::Kept(played) => (played, false),

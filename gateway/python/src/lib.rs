@@ -2,7 +2,7 @@
 //! evaluations, and the whole command line. Python code uses the typed package around it, in
 //! `gateway/python/tandem`.
 //!
-//! Replies are passed as the JSON that HTTP carries, values of every step as arrays. Python's lock is
+//! Replies are passed as the same JSON as over HTTP, and values of every step as arrays. Python's lock is
 //! released during physics and rendering.
 
 mod arrays;
@@ -34,8 +34,8 @@ mod _native {
     #[pymodule_export]
     use crate::worlds::{NativeWorlds, row_contract, row_contract_version, row_rates_hz, row_state_columns};
 
-    /// Sets the path of this library as the build that made episodes, recordings and checkpoints, instead
-    /// of the Python interpreter.
+    /// Sets the path of this library, instead of the Python interpreter, as the build that creates episodes,
+    /// recordings and checkpoints.
     #[pyfunction]
     fn loaded_from(path: PathBuf) {
         tandem_episodes::name_program(path);

@@ -17,29 +17,29 @@ use tandem_tools_spec::{EndReason, ToolCall, ToolReply};
 
 use crate::episode::{Course, NativeEpisode};
 
-/// A policy as Python describes it.
+/// A policy that Python provides.
 #[derive(Debug)]
 pub struct PythonPolicy {
     pub name: String,
     pub by: PlayedBy,
-    /// Set once the user wants it to end.
+    /// Set once the user wants the policy to end.
     pub interrupted: Arc<AtomicBool>,
 }
 
-/// Source of the calls.
+/// Origin of the calls.
 #[derive(Debug)]
 pub enum PlayedBy {
     /// A built-in player.
     BuiltIn(&'static PlayerEntry),
-    /// A callable that is given each episode and its briefing as JSON.
+    /// A callable that is called with each episode and its briefing as JSON.
     Callable(Py<PyAny>),
-    /// A callable that has whole episodes played by another process.
+    /// A callable that lets another process play whole episodes.
     Elsewhere(Py<PyAny>),
 }
 
 impl PlayedBy {
-    /// Chooses the callable `play`, which has episodes played `elsewhere` or plays them itself. Without
-    /// one, chooses the player called `name`.
+    /// Selects the callable `play`, which plays episodes itself or, with `elsewhere`, lets another process
+    /// play them. Without a callable, selects the player called `name`.
     pub fn new(play: Option<Py<PyAny>>, name: &str, elsewhere: bool) -> Result<PlayedBy, PlayerError> {
         Ok(match play {
             None => PlayedBy::BuiltIn(players::find(name)?),
@@ -104,7 +104,7 @@ impl PythonPolicy {
         let (episode, stopped) = Python::attach(|py| self.call(py, play, episode, briefing))
             .map_err(|error| PlayError::Absent(error.to_string()))?;
         if self.is_interrupted() {
-            // The episode does not count, but its recording is whole.
+            // The episode does not count, but its recording is complete.
             let _ = episode.get().end(Some(EndReason::Abandoned));
             return Err(PlayError::Absent("interrupted".into()));
         }
@@ -114,7 +114,8 @@ impl PythonPolicy {
         Ok(PlayOutcome { result, thought, stopped })
     }
 
-    /// Lets the callable play. Returns the episode and the exception that the callable raised, if any.
+    /// Lets the callable play. Returns the episode, and the exception that the callable raised; `None`
+    /// without one.
     fn call(
         &self,
         py: Python,
@@ -126,7 +127,7 @@ impl PythonPolicy {
         let over = py.import("tandem.errors")?.getattr("EpisodeEnded")?;
         match play.call1(py, (episode.clone_ref(py), briefing)) {
             Ok(_) => Ok((episode, None)),
-            // An end during the play is no failure, because the last phase may have been reached.
+            // An end during the play is not a failure, because the last phase may have been reached.
             Err(error) if error.is_instance(py, &over) => Ok((episode, None)),
             Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
                 self.interrupted.store(true, Ordering::Relaxed);
@@ -191,7 +192,7 @@ impl PythonPolicy {
 /// Advice for machines with different builds.
 const SAME_WHEEL: &str = "install the same wheel on every machine";
 
-/// Outcome of an episode that another process was to play.
+/// Outcome of an episode that another process was asked to play.
 enum Elsewhere {
     /// The episode in the format of its file, and the files of its recording.
     Played {
@@ -203,7 +204,7 @@ enum Elsewhere {
     },
 }
 
-/// Writes the files of a recording. The result comes last, because it marks the recording as complete.
+/// Writes the files of a recording. The result is written last, because it marks the recording as complete.
 fn keep(folder: &Path, mut files: Vec<(String, Vec<u8>)>) -> Result<(), String> {
     create_private_folder(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
     files.sort_by_key(|(name, _)| name == RESULT_FILE);
@@ -213,7 +214,7 @@ fn keep(folder: &Path, mut files: Vec<(String, Vec<u8>)>) -> Result<(), String> 
     Ok(())
 }
 
-/// An episode whose calls end once the user interrupts.
+/// An episode whose calls fail once the user interrupts.
 struct Interruptible<'a, E> {
     episode: &'a mut E,
     interrupted: &'a AtomicBool,

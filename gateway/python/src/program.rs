@@ -14,7 +14,7 @@ use tandem_episodes::task_list;
 
 use crate::refusal::failed;
 
-/// Runs the command line with these arguments, which begin with the program's name, and returns its exit
+/// Runs the command line with these arguments, of which the first is the program's name, and returns the exit
 /// code.
 #[pyfunction]
 pub fn run_command_line(py: Python, arguments: Vec<String>) -> u8 {
@@ -37,7 +37,7 @@ pub fn run_command_line(py: Python, arguments: Vec<String>) -> u8 {
     })
 }
 
-/// Runs a command for a function of the package. Its error becomes an exception.
+/// Runs a command for a function of the package. An error becomes an exception.
 #[pyfunction]
 pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
     let run = || -> Result<(), String> {
@@ -47,8 +47,8 @@ pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
     py.detach(run).map_err(|text| failed(py, &text))
 }
 
-/// Returns the number of processors that this process may use. A container's quota counts, not its
-/// machine's cores.
+/// Returns the number of processors that this process may use. In a container, this is the quota rather than
+/// the machine's number of cores.
 #[pyfunction]
 pub fn available_processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
@@ -70,7 +70,7 @@ pub struct NativeServer {
 
 #[pymethods]
 impl NativeServer {
-    /// Starts to serve with these settings, given as JSON.
+    /// Starts a server with these settings, which are JSON.
     #[staticmethod]
     fn start(py: Python, settings: &str) -> PyResult<NativeServer> {
         let start = || -> Result<Server, String> {
@@ -90,7 +90,7 @@ impl NativeServer {
         &self.url
     }
 
-    /// Finishes pending calls and closes every recording. Returns the episodes that did not end in time.
+    /// Finishes pending calls and closes all recordings. Returns the episodes that did not end in time.
     fn stop(&self, py: Python) -> Vec<String> {
         py.detach(|| {
             let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -1,4 +1,4 @@
-//! Recordings as arrays, with images of their steps rendered again.
+//! Recordings as arrays, and new renderings of their steps.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,14 +24,14 @@ use crate::worlds::contract_json;
 pub struct NativeRecording {
     recording: Recording,
     steps: Vec<Step>,
-    /// Created when the first image is requested.
+    /// Renderer, created for the first image.
     renderer: Mutex<Option<EpisodeRenderer>>,
 }
 
 #[pymethods]
 impl NativeRecording {
-    /// Reads a file and checks every byte. Images are drawn by the named renderer with the named model of
-    /// the head cameras, or by the episode's.
+    /// Reads a file and checks every byte. Images are rendered by the named renderer with the named model of
+    /// the head cameras. Without names, they are rendered like those of the episode.
     #[staticmethod]
     fn read(
         py: Python,
@@ -107,8 +107,8 @@ impl NativeRecording {
         columns.arrays(py)
     }
 
-    /// Returns the setpoints of a robot's motors at the end of every step, 5 by 43; NaN where its own
-    /// controller drives it. Returns `None` if that is so throughout.
+    /// Returns the setpoints of a robot's motors at the end of every step, 5 by 43; NaN where the robot's own
+    /// controller drives it. Returns `None` if that controller drives it in all steps.
     fn motor_setpoints<'py>(
         &self,
         py: Python<'py>,
@@ -131,8 +131,8 @@ impl NativeRecording {
         shaped(py, &setpoints, [self.steps.len(), blocks, JOINTS]).map(Some)
     }
 
-    /// Returns the grip of each hand of each robot on each object at every step, as in the scoring: 0 none, 1
-    /// touching, 2 holding.
+    /// Returns the grip of each hand of each robot on each object at every step, as in the scoring: 0 for
+    /// none, 1 for touching, 2 for holding.
     fn grips<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<u8>>> {
         let grips = py.detach(|| self.all_grips()).map_err(|error| failed(py, &error))?;
         let (robots, objects) =
@@ -140,8 +140,8 @@ impl NativeRecording {
         shaped(py, &grips, [self.steps.len(), robots, 2, objects])
     }
 
-    /// Renders the colours and depth of a camera after a step, in its own size or in another, width by
-    /// height.
+    /// Renders the colours and depth of a camera after a step. The size is the camera's size, or another
+    /// width and height.
     fn picture<'py>(
         &self,
         py: Python<'py>,
@@ -158,7 +158,7 @@ impl NativeRecording {
         Ok((shaped(py, &rgb, [height, width, 3])?, shaped(py, &depth_m, [height, width])?))
     }
 
-    /// Renders only the colours, like the image of a policy that requests this size.
+    /// Renders only the colours, like an image for a policy that requests this size.
     fn colours<'py>(
         &self,
         py: Python<'py>,
@@ -173,7 +173,7 @@ impl NativeRecording {
     }
 }
 
-/// Finds one of `all` by its name.
+/// Returns the element of `all` with this name.
 fn found<T: Copy, const N: usize>(
     py: Python,
     what: &str,
@@ -187,7 +187,7 @@ fn found<T: Copy, const N: usize>(
 }
 
 impl NativeRecording {
-    /// Renders a step with `draw`.
+    /// Renders the state after a step with `draw`.
     fn drawn<T: Send>(
         &self,
         py: Python,
@@ -214,7 +214,7 @@ impl NativeRecording {
         drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))
     }
 
-    /// Returns grips by step, robot, left and right hand, and object. There is no grip before the first step.
+    /// Returns grips by step, robot, hand (left, right) and object. There is no grip before the first step.
     fn all_grips(&self) -> Result<Vec<u8>, RecordingError> {
         let Some(start) = self.steps.first() else { return Ok(Vec::new()) };
         let spec = &self.recording.spec;
@@ -239,7 +239,7 @@ impl NativeRecording {
     }
 }
 
-/// Values of all steps, one step after another.
+/// Values of all steps, step by step.
 #[derive(Default)]
 struct Columns {
     shape: (usize, usize, usize),
@@ -323,5 +323,5 @@ impl Columns {
     }
 }
 
-/// Number of contact force values of a hand: three each for thumb, fingers and palm.
+/// Number of contact force values of a hand: three values each for thumb, fingers and palm.
 const HAND_NUMBERS: usize = 9;

@@ -1,5 +1,5 @@
-//! Refusals as Python exceptions: the kind of refusal decides the class, and the text is that of the
-//! server.
+//! Refusals as Python exceptions. The kind of refusal determines the class, and the text is the same as the
+//! server's.
 
 use std::fmt::Display;
 
@@ -22,12 +22,12 @@ pub fn failed(py: Python, error: &dyn Display) -> PyErr {
     raised(py, ("failed", "Failed", error.to_string()))
 }
 
-/// Returns the error message for use in a forked process.
+/// Returns the error message for use of an object in a forked process.
 pub fn forked(maker: u32) -> String {
     format!("this was made in process {maker}, of which this one is a fork; make another one here")
 }
 
-/// Creates the exception. Its class is from the package, because callers over HTTP get the same classes.
+/// Creates the exception. The package defines its class, because callers over HTTP get the same classes.
 fn raised(py: Python, (kind, title, detail): (&str, &str, String)) -> PyErr {
     let made = py
         .import("tandem.errors")

@@ -20,21 +20,21 @@ use tandem_tools_spec::{Protocol, StartEpisode};
 use crate::arrays::shaped;
 use crate::refusal::{failed, forked, refused};
 
-/// Worlds of one task. They may be used from any thread; concurrent calls are serialized.
+/// Worlds of one task. They may be used from any thread, but concurrent calls are serialized.
 #[pyclass(frozen, name = "Worlds", module = "tandem._native")]
 pub struct NativeWorlds {
     batch: Mutex<Option<Batch>>,
-    /// Id of the process that made it. A forked process has neither the threads nor the files of its
-    /// parent.
+    /// Id of the process that created the worlds. A forked process has neither the threads nor the files of
+    /// its parent.
     process: u32,
     worlds: usize,
     robots: usize,
     actions: ActionKind,
 }
 
-/// Outcomes by world: reward, terminated, truncated, phases, fallen (by robot), steps, the episode's
-/// seed, and the seed of the next episode if it has begun, or -1. Then the worlds in which the simulator
-/// failed, and how.
+/// Outcomes by world: reward, terminated, truncated, phases, falls by robot, steps, seed of the episode, and
+/// seed of the next episode if it has begun, otherwise -1. Then the worlds in which the simulator failed,
+/// with the errors. The last array is the share of joint targets beyond the joints' limits, by world.
 type Outcomes<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<bool>>,
@@ -48,13 +48,13 @@ type Outcomes<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Output arrays of observations: worlds by robots by columns, and worlds by robots by height by width by
-/// red, green, blue.
+/// Output arrays of observations: states (worlds by robots by columns), and images (worlds by robots by
+/// height by width by red, green, blue).
 type Seen<'py> = (PyReadwriteArray3<'py, f32>, Option<PyReadwriteArray5<'py, u8>>);
 
 #[pymethods]
 impl NativeWorlds {
-    /// Creates worlds without episodes. With `threads` = 0 there are as many threads as cores.
+    /// Creates worlds without episodes. If `threads` is 0, there are as many threads as cores.
     #[new]
     #[pyo3(signature = (task, settings, worlds, threads, actions, rate_hz, reward, pictures, record))]
     #[allow(clippy::too_many_arguments)]
@@ -86,8 +86,8 @@ impl NativeWorlds {
         Ok(NativeWorlds { batch, process: process::id(), worlds, robots, actions })
     }
 
-    /// Begins an episode in each chosen world, with its seed, or with that of the next round if the seed
-    /// is negative.
+    /// Begins an episode in each chosen world. The seed is the given one, or that of the next round if the
+    /// given one is negative.
     fn reset<'py>(
         &self,
         py: Python<'py>,
@@ -107,7 +107,7 @@ impl NativeWorlds {
         self.outcomes(py, begun)
     }
 
-    /// Carries out a row of each robot in each world: worlds by robots by columns.
+    /// Executes a row for each robot in each world, given as worlds by robots by columns.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -145,7 +145,7 @@ impl NativeWorlds {
         shaped(py, &pixels, [self.robots, height, width, 3])
     }
 
-    /// Returns 16 hexadecimal digits that are equal for equal physical states of a world.
+    /// Returns the hash of a world's physical state: 16 hexadecimal digits, which are equal for equal states.
     fn state_hash(&self, py: Python, world: usize) -> PyResult<String> {
         self.work(py, |batch| batch.state_hash(world))
     }
@@ -165,7 +165,7 @@ impl NativeWorlds {
         self.batch.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs `work` on the worlds. Python's other threads run meanwhile.
+    /// Runs `work` on the worlds. Other Python threads run meanwhile.
     fn work<T: Send>(
         &self,
         py: Python,
@@ -228,7 +228,7 @@ impl NativeWorlds {
     }
 }
 
-/// Leaks the worlds in a forked process, because their files are the parent's.
+/// Leaks the worlds in a forked process, because their files belong to the parent.
 impl Drop for NativeWorlds {
     fn drop(&mut self) {
         if process::id() != self.process {
@@ -237,14 +237,14 @@ impl Drop for NativeWorlds {
     }
 }
 
-/// Returns the JSON of the layout of a robot's rows in environments of a task.
+/// Returns the layout of a robot's rows in environments of a task, as JSON.
 #[pyfunction]
 pub fn row_contract(py: Python, task: String, settings: &str, actions: &str) -> PyResult<String> {
     let episode = benchmark_episode(py, task, settings)?;
     contract_json(py, &episode, action_kind(py, actions)?)
 }
 
-/// Returns the rates at which rows are written and played, in Hz, the control rate first.
+/// Returns the rates in Hz at which rows are written and played. The control rate is first.
 #[pyfunction]
 pub fn row_rates_hz() -> Vec<u32> {
     ROW_RATES_HZ.to_vec()
@@ -262,7 +262,7 @@ pub fn row_contract_version() -> u32 {
     ROW_CONTRACT_VERSION
 }
 
-/// Returns the JSON of the layout of the rows of an episode's robots.
+/// Returns the layout of the rows of an episode's robots, as JSON.
 pub fn contract_json(py: Python, episode: &EpisodeSpec, actions: ActionKind) -> PyResult<String> {
     let contract = RowContract::of(episode, actions).map_err(|error| failed(py, &error))?;
     serde_json::to_string(&contract).map_err(|error| failed(py, &error))

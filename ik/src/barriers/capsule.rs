@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::model::{Configuration, FrameId};
 
-/// A sphere swept along a segment, fixed to a frame; a sphere if both ends are the same.
+/// A sphere swept along a segment, fixed to a frame. If both ends are the same, it is a sphere.
 #[derive(Clone, Debug)]
 pub struct Capsule {
     /// Frame that it moves with.

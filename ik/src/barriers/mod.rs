@@ -19,22 +19,22 @@ use nalgebra::Vector3;
 use crate::model::{Configuration, FrameId};
 use crate::qp::Row;
 
-/// A plane that a frame stays beyond: normal . p >= offset with p the origin of the frame, in the root's
-/// frame.
+/// A plane on whose free side a frame stays: normal . p >= offset, with p the origin of the frame in the
+/// root's frame.
 #[derive(Clone, Debug)]
 pub struct PositionBarrier {
-    /// The frame that stays beyond the plane.
+    /// Frame that stays on the free side.
     pub frame: FrameId,
-    /// Unit vector to the free side.
+    /// Unit normal, root's frame, towards the free side.
     pub normal: Vector3<f64>,
     /// Offset of the plane along the normal, m.
     pub offset_m: f64,
-    /// Share of the distance that one step may take.
+    /// Share of the distance to the plane that one step may take.
     pub gain: f64,
 }
 
 impl PositionBarrier {
-    /// Returns the distance of the frame's origin to the plane, m; negative beyond it.
+    /// Returns the signed distance of the frame's origin from the plane, m; positive on the free side.
     pub fn height_m(&self, configuration: &Configuration) -> f64 {
         self.normal.dot(&configuration.root_from_frame(self.frame).translation.vector) - self.offset_m
     }

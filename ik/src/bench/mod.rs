@@ -1,4 +1,4 @@
-//! Benchmark of the crate on pairs of wrist targets, in the way that Pink and its relatives are measured.
+//! Benchmark of the crate on pairs of wrist targets, measured like Pink and related solvers.
 //!
 //! A targets file holds the free joints, their start coordinates, and poses to reach:
 //! ```text
@@ -30,26 +30,26 @@ const RESTARTS: usize = 10;
 /// Measurements of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// One entry per way to solve.
+    /// One entry per method.
     pub configurations: Vec<Measured>,
 }
 
-/// One way to solve, over all targets.
+/// Results of one method over all targets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// Name of the way; `default` and `tuned` are Pink's two, the others use features beyond Pink.
+    /// Name of the method. `default` and `tuned` are Pink's, the others use features beyond Pink.
     pub name: &'static str,
     /// Share of the targets reached, 0..=1.
     pub reached: f64,
     /// Median number of steps, over reached targets.
     pub iterations_median: f64,
-    /// Kinematics, Jacobians and quadratic program of one step, us.
+    /// Median time for kinematics, Jacobians and quadratic program of one step, us.
     pub step_us_median: f64,
-    /// Time from start to target, over reached targets, ms.
+    /// Median time from start to target, over reached targets, ms.
     pub solve_ms_median: f64,
 }
 
-/// A way to approach targets.
+/// A method of approaching targets.
 #[derive(Clone, Copy)]
 struct Way {
     name: &'static str,
@@ -65,7 +65,7 @@ const WAYS: [Way; 4] = [
     Way { name: "at most 10 restarts", damping_cost: TUNED_DAMPING_COST, restarts: Some(RESTARTS) },
 ];
 
-/// Solves every target in every way. `whole` may have more joints than the set frees.
+/// Solves every target with every method. `whole` may have more joints than the set frees.
 ///
 /// # Errors
 ///

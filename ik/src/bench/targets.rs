@@ -21,7 +21,7 @@ pub struct TargetSet {
     pub start_q_rad: Vec<f64>,
     /// Names of the frames to move.
     pub frames: Vec<String>,
-    /// Maximum speeds of joints that have none, or other ones, in the model's file.
+    /// Maximum speeds of joints, which replace those in the model's file.
     #[serde(default)]
     pub limits: BTreeMap<String, SpeedLimit>,
     /// One entry per problem.

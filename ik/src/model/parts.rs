@@ -35,9 +35,9 @@ pub struct Joint {
 /// A frame fixed to a joint, or to the root.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Name of a body, link or site.
+    /// Name of the body, link or site.
     pub name: String,
-    /// Joint that it moves with; `None` on the root.
+    /// Joint that the frame moves with; `None` on the root.
     pub joint: Option<usize>,
     /// Pose in that joint's frame.
     pub joint_from_frame: Isometry3<f64>,

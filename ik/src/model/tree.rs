@@ -1,5 +1,5 @@
-//! The tree itself: its joints, frames and masses, found by name. It can be reduced by locking joints,
-//! for example for a robot that stands and moves its arms.
+//! The tree: its joints, frames and masses, found by name. Locking joints reduces it, for example for a robot
+//! that stands and moves its arms.
 
 use nalgebra::Isometry3;
 
@@ -11,7 +11,7 @@ use crate::error::IkError;
 pub struct Model {
     pub(crate) joints: Vec<Joint>,
     pub(crate) frames: Vec<Frame>,
-    /// One per joint, and the root's last.
+    /// One mass per joint, and the root's last.
     pub(crate) masses: Vec<Mass>,
     /// Joints from the root to each joint, that joint last.
     pub(crate) supports: Vec<Vec<usize>>,

@@ -6,9 +6,10 @@ use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 
 use super::problem::{Constraint, Qp, QpFailure};
 
-/// Violation below which it counts as rounding.
+/// Constraint violation below which it counts as rounding error.
 const TOLERANCE: f64 = 1e-11;
-/// Relative size below which a constraint's normal is in the span of the active ones.
+/// Relative size of the part of a normal outside the span of the active normals, below which it counts as
+/// inside.
 const DEPENDENT: f64 = 1e-20;
 
 impl Qp {
@@ -114,7 +115,7 @@ impl Qp {
     }
 
     /// Returns the largest dual step before a multiplier changes sign, and the index of that multiplier.
-    /// Equalities never leave.
+    /// Equalities stay active.
     fn dual_limit(&self) -> (f64, usize) {
         let mut limit = (f64::INFINITY, 0);
         for (k, (constraint, _)) in self.active.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A problem's data and work space, and the way from the unconstrained minimum to the solution. Rows are
+//! Data and work space of a problem, and the steps from the unconstrained minimum to the solution. Rows are
 //! rewritten for every solution in retained memory.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -34,7 +34,7 @@ pub enum QpFailure {
     NotConvex,
     /// This constraint contradicts others.
     Infeasible(Constraint),
-    /// Rounding kept the active set from settling.
+    /// Rounding errors kept the active set from settling.
     Unsettled,
 }
 
@@ -195,8 +195,8 @@ impl Qp {
         self.lower.iter().zip(&self.upper).all(within) && self.rows().iter().all(keeps)
     }
 
-    /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x
-    /// within the bounds on x. Returns true if there was any.
+    /// Lowers the bound of every inequality that x = 0 violates to at most `cap(largest)`, with `largest` the
+    /// maximum of  a' x  within the bounds on x. Returns true if any bound was lowered.
     pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {
         let mut lowered = false;
         for row in self.rows[..self.used_rows].iter_mut().filter(|row| !row.equality && row.bound > 0.0) {

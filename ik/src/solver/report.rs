@@ -10,7 +10,7 @@ use crate::tasks::FrameError;
 pub enum Outcome {
     /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is crossed.
     Reached,
-    /// The joints are on the way.
+    /// The joints are moving towards the targets.
     Moving,
     /// No further progress.
     Stalled {

@@ -13,7 +13,7 @@ pub struct SolveOptions {
     pub max_iterations: usize,
     /// Further attempts from random coordinates after a stall. They are for planning, never for streaming.
     pub restarts: usize,
-    /// Seed of those coordinates.
+    /// Seed of these random coordinates.
     pub seed: u64,
     /// Tasks that hold exactly, as in [`Solver::step`].
     pub constraints: Vec<Task>,

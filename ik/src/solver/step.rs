@@ -17,11 +17,12 @@ pub struct Solver {
     pub limits: Limits,
     /// Pairs of shapes to keep apart.
     pub self_collision: Option<SelfCollision>,
-    /// Planes to stay beyond.
+    /// Planes on whose free sides frames stay.
     pub position_barriers: Vec<PositionBarrier>,
     /// Tolerance within which a frame counts as reached.
     pub tolerance: Tolerance,
-    /// Memory of [`Solver::track`] of failed steps, at least 1. Save it along with the joints.
+    /// State of [`Solver::track`]: caution after failed steps, at least 1. Save it along with the joint
+    /// coordinates.
     pub caution: f64,
     pub(super) qp: Qp,
     pub(super) row_owners: Vec<RowOwner>,
@@ -31,8 +32,8 @@ pub struct Solver {
     pub(super) bounds: Vec<[(f64, LimitKind); 2]>,
 }
 
-/// Speed below which a step away from its goal has stalled, in rad/s or m/s: it would make no progress
-/// in seconds.
+/// Joint speed (rad/s or m/s) below which a step away from its target counts as stalled: several seconds
+/// would bring no progress.
 const STALLED_SPEED: f64 = 0.02;
 
 impl Solver {
@@ -73,7 +74,7 @@ impl Solver {
         self.outcome(configuration, tasks)
     }
 
-    /// Stores `scale` times the displacement as the last velocity.
+    /// Stores the velocity  scale dq / dt  as the last velocity.
     pub(crate) fn remember(&mut self, scale: f64) {
         for (velocity, dq) in self.last_velocity.iter_mut().zip(&self.qp.x) {
             *velocity = scale * dq / self.dt_s;
@@ -123,7 +124,7 @@ impl Solver {
         self.self_collision.as_ref().and_then(|barrier| barrier.closest(configuration))
     }
 
-    /// Clears the memory of the last steps: the next one starts at rest and without caution.
+    /// Clears the state from previous steps: the next step starts at rest and without caution.
     pub fn rest(&mut self) {
         self.last_velocity.fill(0.0);
         self.caution = 1.0;
@@ -136,7 +137,8 @@ impl Solver {
         there && !self.crosses_barrier(configuration)
     }
 
-    /// Returns true if shapes overlap or a frame is beyond its plane.
+    /// Returns true if shapes overlap, or a frame is on the wrong side of its plane by more than the
+    /// tolerance.
     pub(crate) fn crosses_barrier(&self, configuration: &Configuration) -> bool {
         let beyond = |barrier: &PositionBarrier| barrier.height_m(configuration) < -self.tolerance.position_m;
         self.closest_pair(configuration).is_some_and(|pair| pair.distance_m < 0.0)

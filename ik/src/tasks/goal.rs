@@ -6,8 +6,8 @@ use crate::model::{Configuration, Model};
 
 /// One kind of task, which a [`super::Task`] delegates to.
 pub(crate) trait Goal {
-    /// Returns the error of a frame's pose or of the centre of mass; `None` for tasks that only shape
-    /// the way there.
+    /// Returns the error of a frame's pose or of the centre of mass. Returns `None` for tasks without such a
+    /// target.
     fn frame_error(&self, _: &Configuration) -> Option<FrameError> {
         None
     }

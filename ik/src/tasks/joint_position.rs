@@ -1,4 +1,4 @@
-//! Tasks on the coordinates of joints: all near given ones, or some in a linear relation.
+//! Tasks on joint coordinates: all joints near given coordinates, or some joints in a linear relation.
 
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};

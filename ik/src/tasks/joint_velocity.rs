@@ -1,4 +1,4 @@
-//! Tasks on the speeds of all joints: given ones, none, or those of the last step.
+//! Tasks on the speeds of all joints: given speeds, zero, or the speeds of the last step.
 
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
@@ -22,8 +22,8 @@ impl Goal for JointVelocityTask {
     }
 }
 
-/// Task that penalises joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task leaves dt out;
-/// its cost is this one's over dt.
+/// Task that penalises joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task omits dt; its cost is
+/// this cost divided by dt.
 #[derive(Clone, Debug)]
 pub struct DampingTask {
     /// Cost per rad/s or m/s.

@@ -46,8 +46,8 @@ pub enum Task {
 }
 
 impl Task {
-    /// Returns the error of a frame's pose or of the centre of mass; `None` for tasks that only shape
-    /// the way there.
+    /// Returns the error of a frame's pose or of the centre of mass. Returns `None` for tasks without such a
+    /// target.
     pub fn error(&self, configuration: &Configuration) -> Option<FrameError> {
         self.goal().frame_error(configuration)
     }

@@ -12,7 +12,7 @@ pub(super) fn weighted_square(error: &Vector6<f64>, [position, orientation]: [f6
         + (orientation * error.fixed_rows::<3>(3)).norm_squared()
 }
 
-/// Clamps a pose error to the clamp's distance and angle; the motion starts in the same direction.
+/// Clamps a pose error to the distance and angle of the clamp. The initial direction of motion is unchanged.
 pub(super) fn clamped(missing: &Isometry3<f64>, clamp: Option<FrameError>) -> Isometry3<f64> {
     let Some(clamp) = clamp else { return *missing };
     let (way, turn) = (missing.translation.vector, missing.rotation.scaled_axis());

@@ -9,7 +9,7 @@ use super::{JOINTS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// A robot's estimate of its own body: joint readings, link poses, centre of mass. A controller may use
-/// nothing else. The world frame is the robot's estimate of that frame.
+/// nothing else. All poses are in the robot's estimate of the world frame.
 pub struct BodyEstimate {
     pub model: Arc<RobotModel>,
     pub q_rad: [f32; JOINTS],
@@ -21,12 +21,12 @@ pub struct BodyEstimate {
     pub com_velocity_m_s: Vector,
     /// Velocity of the middle of each palm.
     pub palm_velocity_m_s: Sides<Vector>,
-    /// Load of each arm on the trunk, as a force at its palm: the force of the world on the hand, and
-    /// the inertia of the moving arm.
+    /// Load of each arm on the trunk, as a force at the arm's palm: the external force on the hand, and the
+    /// inertial force of the moving arm.
     pub hand_reaction_n: Sides<Vector>,
-    /// True if both thumb and fingers press on an object.
+    /// True if both thumb and fingers of the hand press on an object.
     pub hand_holds: Sides<bool>,
-    /// True if thumb or fingers press on an object.
+    /// True if thumb or fingers of the hand press on an object.
     pub hand_presses: Sides<bool>,
     /// True if arms or fingers are commanded to move.
     pub arms_told: bool,
@@ -49,7 +49,7 @@ pub(crate) struct PelvisMotion {
     pub spin_rad_s: Vector,
 }
 
-/// Velocity of a link's origin, and its spin, in world axes.
+/// Velocity of a link's origin, and angular velocity, in world axes.
 #[derive(Clone, Copy)]
 pub(crate) struct LinkMotion {
     pub velocity_m_s: Vector,
@@ -87,7 +87,7 @@ impl LinkMotion {
 }
 
 impl BodyEstimate {
-    /// Creates the estimate from joints, pelvis and the resulting link poses, with empty hands.
+    /// Creates the estimate from joints, pelvis and the resulting link poses, for empty hands.
     pub(crate) fn of_motion(
         model: &Arc<RobotModel>,
         pelvis: &PelvisMotion,

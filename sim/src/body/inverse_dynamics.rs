@@ -1,4 +1,4 @@
-//! Inverse dynamics of one robot: the joint torques and the external wrench that a wanted motion requires.
+//! Inverse dynamics of one robot: the joint torques and the external wrench that a given motion requires.
 //!
 //! Newton-Euler in the world frame. Outwards, with r, a the origin and axis of a joint and p the parent link:
 //!   w = w_p + a q',   dw = dw_p + a q'' + w_p x a q',   acc = acc_p + dw_p x r + w_p x (w_p x r).
@@ -21,7 +21,7 @@ pub struct Acceleration {
 pub struct Effort {
     /// Torque on each joint, in published order.
     pub torque_n_m: [f32; JOINTS],
-    /// External force on the whole robot, beside gravity.
+    /// External force on the whole robot besides gravity.
     pub force_n: Vector,
     /// Moment on the whole robot about the pelvis' origin.
     pub moment_n_m: Vector,
@@ -38,7 +38,7 @@ struct Moving {
 }
 
 impl BodyEstimate {
-    /// Returns the effort of an acceleration of the pelvis and of all joints (rad/s^2), at the measured
+    /// Returns the effort for an acceleration of the pelvis and of all joints (rad/s^2), at the measured
     /// positions and velocities.
     pub fn inverse_dynamics(&self, pelvis: Acceleration, qdd_rad_s2: &[f32; JOINTS]) -> Effort {
         let mut links: Vec<Moving> = Vec::with_capacity(self.model.links.len());

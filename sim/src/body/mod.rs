@@ -1,6 +1,5 @@
-//! Knowledge of a robot that is open to a controller: its model, the order of its joints, kinematics and
-//! inverse dynamics. This module has no physics world: the code that senses a robot fills in a
-//! [`BodyEstimate`].
+//! Data of a robot that a controller may use: its model, the order of its joints, kinematics and inverse
+//! dynamics. This module has no physics world. The code that senses a robot creates a [`BodyEstimate`].
 
 mod estimate;
 mod inverse_dynamics;

@@ -33,11 +33,11 @@ impl MotorSetpoints {
 
     /// Returns the drives for physics steps of `dt_s`.
     ///
-    /// A drive's spring is implicit in the step, which damps as `dt kp` more of `kd` would: 40 % more at a
-    /// knee of 300 N m/rad and 4 N m s/rad. A policy tuned on other gains feels that, so this damping is
-    /// taken off `kd`, which makes the spring explicit. An explicit spring is stable for `dt^2 kp < 4 I`,
-    /// and a joint's inertia I is at least its armature. So at most `armature / dt` is taken off, and
-    /// springs that are stiffer than `armature / dt^2` keep the rest.
+    /// A drive's spring is implicit in the step, which adds damping equal to `dt kp`. For a knee with 300 N
+    /// m/rad and 4 N m s/rad, this is 40 % of `kd`. A policy tuned on other gains would notice, so this
+    /// damping is subtracted from `kd`, which makes the spring explicit. An explicit spring is stable for
+    /// `dt^2 kp < 4 I`, and a joint's inertia I is at least its armature. So at most `armature / dt` is
+    /// subtracted. Springs stiffer than `armature / dt^2` keep the rest.
     pub(crate) fn drives(&self, joints: &[JointModel], dt_s: f32) -> [JointDrive; JOINTS] {
         std::array::from_fn(|joint| {
             let (kp_n_m_rad, kd_n_m_s_rad) = (self.kp_n_m_rad[joint], self.kd_n_m_s_rad[joint]);
@@ -58,8 +58,8 @@ mod tests {
     use crate::PHYSICS_DT_S;
     use crate::body::posed::model;
 
-    /// Returns the amplitude ratio of successive swings of  I q'' + kd q' + kp q = 0  under the drive that
-    /// `drive` is in the simulator's step.
+    /// Returns the amplitude ratio of successive swings of  I q'' + kd q' + kp q = 0  with `drive` in the
+    /// simulator's step.
     fn decay(drive: &JointDrive, inertia_kg_m2: f32, swings: u32) -> f32 {
         let (mut q_rad, mut v_rad_s, mut turned, mut peak_rad) = (0.1f32, 0.0f32, 0, 0.1f32);
         while turned < 2 * swings {
@@ -91,7 +91,7 @@ mod tests {
         assert!(off(&implicit) > 0.25, "an implicit spring damps more");
     }
 
-    /// Springs that are stiffer than a step can follow explicitly stay stable.
+    /// Springs too stiff for the explicit form stay stable.
     #[test]
     fn a_stiff_spring_of_a_light_finger_does_not_oscillate() {
         let finger = model().joints.iter().position(|joint| joint.name == "left_hand_index_1_joint").unwrap();

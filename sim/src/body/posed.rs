@@ -1,4 +1,4 @@
-//! Robots for tests: the embedded model in any pose and motion, without a physics world.
+//! Robots for tests: the embedded model with any pose and motion, without a physics world.
 
 use std::sync::{Arc, OnceLock};
 
@@ -27,7 +27,7 @@ pub(crate) struct Posed {
 }
 
 impl Posed {
-    /// Returns the robot at rest as in its file, the soles on the ground.
+    /// Returns the robot at rest as in its file, with the soles on the ground.
     pub(crate) fn standing() -> Posed {
         let mut posed = Posed {
             world_from_pelvis: Pose::IDENTITY,
@@ -40,8 +40,8 @@ impl Posed {
         posed
     }
 
-    /// Returns a robot that is turned, leaning and moving, with each joint within its limits. `seed`
-    /// varies it.
+    /// Returns a robot that is turned, leaning and moving, with each joint within its limits. The state
+    /// depends on `seed`.
     pub(crate) fn tumbling(seed: u32) -> Posed {
         let wave = |i: usize, part: f32| (1.7 * i as f32 + 2.3 * seed as f32 + part).sin();
         let mut posed = Posed::standing();

@@ -1,4 +1,4 @@
-//! Kinematics against differences of positions, dynamics against differences of momentum and energy.
+//! Kinematics against differences of positions, and dynamics against differences of momentum and energy.
 
 use rapier3d::math::Vector;
 
@@ -68,7 +68,7 @@ fn gravity_torques_are_the_slope_of_the_potential_energy() {
     }
 }
 
-/// A robot at rest needs an external force equal to its weight, and gravity's torques from its joints.
+/// A robot at rest needs an external force equal to its weight, and its joints need gravity's torques.
 #[test]
 fn rest_takes_the_weight() {
     let body = Posed::standing().body();
@@ -162,7 +162,7 @@ fn effort_limits_are_those_of_the_mjcf_or_of_the_urdf() {
     assert_eq!(differ, expected);
 }
 
-/// Unitree's numbers, each with the motor that has it.
+/// Unitree's speed limits, each with the motor it belongs to.
 #[test]
 fn motors_are_as_fast_as_unitree_says() {
     let limit_rad_s = |name: &str| {

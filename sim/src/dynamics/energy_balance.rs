@@ -1,4 +1,4 @@
-//! The energy balance of a step by its sources, for benches and tests. A step itself runs none of this.
+//! Energy balance of a step by sources, for benchmarks and tests. A step itself does not compute it.
 //!
 //! The solver finds velocities v' from those before, v, by
 //!   M(q) (v' - v) = P - dt h,
@@ -12,14 +12,14 @@
 //! remainder, with U the potential of gravity and springs:
 //!   made = [K + U](q', v'') - [K + U](q, v) - W_drives - W_pushes - taken
 //!        = K(q', v'') - K(q, v') - dt h . u + U(q') - U(q) + W_gravity + W_springs.
-//! Pushing bodies out of each other moves positions alone. Energy from lifting something that way counts
-//! as made, too.
+//! Correction of penetration changes positions alone. Energy from lifting a body that way counts as made,
+//! too.
 
 use super::trees::spatial::{ForceVector, Inertia, MotionVector};
 use super::trees::tree::Tree;
 use super::{DVec3, Dynamics};
 
-/// State before the step that [`Dynamics::energy_balance`] needs, pushes included.
+/// State before a step, pushes included, for [`Dynamics::energy_balance`].
 pub struct EnergyBefore {
     trees: Vec<TreeBefore>,
 }
@@ -40,10 +40,10 @@ struct TreeBefore {
 pub struct EnergyBalance {
     /// Kinetic energy before the step.
     pub kinetic: f64,
-    /// Sum of the positive works of each drive, push and spring, and of gravity on each tree.
+    /// Sum of all positive work: of each drive, push and spring, and of gravity on each tree.
     pub put_in: f64,
-    /// Work of contacts, ends of ranges, dry friction, dampers and equalities; not above 0 if they are
-    /// solved well.
+    /// Work of contacts, ends of ranges, dry friction, dampers and equalities. It is not above 0 if they are
+    /// solved accurately.
     pub taken: f64,
     /// Spurious energy, by tree.
     pub made: Vec<f64>,
@@ -57,7 +57,7 @@ impl Dynamics {
         EnergyBefore { trees: self.trees.all.iter().map(|tree| TreeBefore::of(tree, gravity)).collect() }
     }
 
-    /// Returns the energy balance of the step made since `before`.
+    /// Returns the energy balance of the step after `before`.
     pub fn energy_balance(&self, before: &EnergyBefore) -> EnergyBalance {
         let mut balance = EnergyBalance::default();
         for ((tree, before), offset) in self.trees.all.iter().zip(&before.trees).zip(&self.trees.offset) {
@@ -83,8 +83,8 @@ impl TreeBefore {
         }
     }
 
-    /// Adds the step of one tree. `tree` is its state at the end, `solved` are the velocities that the
-    /// solver found.
+    /// Adds the energies of one tree's step. `tree` is in its state at the end, and `solved` are the
+    /// velocities from the solver.
     fn close(&self, tree: &Tree, solved: &[f64], dt_s: f64, gravity: DVec3, balance: &mut EnergyBalance) {
         let mut solved = solved.to_vec();
         if tree.is_lone() {
@@ -135,8 +135,8 @@ impl TreeBefore {
         velocities
     }
 
-    /// Returns h . u, link by link: the force that the link's own motion requires, without gravity, at
-    /// its mean velocity.
+    /// Returns h . u, summed over the links: the power at the mean velocity of the force that each link's
+    /// present motion requires, without gravity.
     fn coriolis_power(&self, tree: &Tree, mean: &[MotionVector]) -> f64 {
         let mut accelerations: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
         let mut power = 0.0;
@@ -147,7 +147,7 @@ impl TreeBefore {
                     let before = self.velocity[parent];
                     accelerations[parent] + before.cross(velocity - before)
                 }
-                // This is as in `equations`: the degrees of freedom of a free link are the velocity of a
+                // `equations` does the same: the degrees of freedom of a free link are the velocity of a
                 // moving point.
                 None if link.joint.dofs() == 6 => {
                     MotionVector { angular: DVec3::ZERO, linear: -velocity.angular.cross(velocity.linear) }

@@ -7,7 +7,7 @@
 //! whitened velocities (`trees::factor`). It builds rows of contacts (`contacts::friction`), joints
 //! (`joints::bounds`) and equalities (`joints::equality`), and runs Gauss-Seidel on them (`solving`).
 //! Finally it computes new positions (`trees::kinematics`), and removes spurious energy from fast trees
-//! (`trees::energy`). This module has no knowledge of robots or file formats.
+//! (`trees::energy`). This module does not depend on robots or file formats.
 //!
 //! SI units, radians, f64 throughout. The direction of gravity in the world axes is a setting. The same
 //! sequence of calls gives the same bits: trees and colliders are numbered in the order in which they
@@ -53,7 +53,7 @@ pub struct Dynamics {
     solver: Solver,
     /// Contacts that are left out of steps.
     sleeping: SleepingContacts,
-    /// Velocities of all trees by which positions move, and those at the end of the step.
+    /// Velocities of all trees by which positions move, and the velocities at the end of the step.
     moving_v: Vec<f64>,
     final_v: Vec<f64>,
 }
@@ -94,18 +94,18 @@ impl Dynamics {
         self.collision.add(collider, &self.trees, &self.settings)
     }
 
-    /// Excludes contacts between these two links. Call it before the first step.
+    /// Excludes contacts between two links. Call it before the first step.
     pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
         self.collision.keep_apart(a, b);
     }
 
-    /// Excludes contacts between two colliders. It must be called before the first step.
+    /// Excludes contacts between two colliders. Call it before the first step.
     pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
         self.collision.keep_colliders_apart(a, b);
     }
 
-    /// Lets two colliders touch regardless of their masks, links and joints, with this friction. It must be
-    /// called before the first step.
+    /// Lets two colliders touch with this friction, regardless of their masks, links and joints. Call it
+    /// before the first step.
     pub fn let_touch(&mut self, a: ColliderId, b: ColliderId, friction: Friction) {
         self.collision.let_touch(a, b, friction);
     }
@@ -128,7 +128,7 @@ impl Dynamics {
         &self.trees.all[id.index()]
     }
 
-    /// Returns a tree to be changed. If it sleeps, it wakes.
+    /// Returns a tree for modification. A sleeping tree wakes.
     pub fn tree_mut(&mut self, id: TreeId) -> &mut Tree {
         if self.trees.all[id.index()].is_asleep() {
             self.wake(id);
@@ -146,7 +146,7 @@ impl Dynamics {
         numbered.filter(|(collider, _)| collider.on == Some(link)).map(|(_, id)| ColliderId(id)).collect()
     }
 
-    /// Reduces the friction of all colliders with this tag to a share; see [`Friction::left`].
+    /// Reduces the friction of all colliders with this tag to a share, see [`Friction::left`].
     pub fn leave_friction(&mut self, tag: u128, share: f64) {
         let of_tag = self.collision.colliders_mut().filter(|collider| collider.tag == tag);
         of_tag.for_each(|collider| collider.friction.left = share);
@@ -161,13 +161,13 @@ impl Dynamics {
         })
     }
 
-    /// Returns all contact points of the last step, and those of sleeping bodies.
+    /// Returns all contact points of the last step, those of sleeping bodies included.
     pub fn touches(&self) -> impl Iterator<Item = &ContactPoint> {
         self.solver.touches.iter().chain(&self.sleeping.touches)
     }
 
-    /// Returns the contacts on a collider in the last step, point by point: the other collider and the
-    /// force on this one (N, world axes), friction included.
+    /// Returns the contacts on a collider in the last step, point by point. Each entry is the other collider
+    /// and the force on this one (N, world axes), friction included.
     pub fn forces_on(&self, collider: ColliderId) -> impl Iterator<Item = (ColliderId, DVec3)> {
         let per_s = 1.0 / self.settings.dt_s;
         self.touches().filter_map(move |touch| match touch.colliders {

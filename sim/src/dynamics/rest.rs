@@ -16,7 +16,7 @@ const STILL: f64 = 0.002;
 const STILL_STEPS: u32 = 40;
 
 impl Rest {
-    /// Counts a step that the body ended with this velocity.
+    /// Counts a step at whose end the body has this speed.
     pub fn count(&mut self, speed: f64) {
         self.still_steps = if speed < STILL { (self.still_steps + 1).min(STILL_STEPS) } else { 0 };
     }

@@ -3,7 +3,7 @@
 
 use rapier3d::glamx::DVec3;
 
-/// A spring and damper by their frequency and damping ratio, as in Catto's soft constraints (GDC 2011).
+/// Spring and damper, given by frequency and damping ratio as in Catto's soft constraints (GDC 2011).
 #[derive(Clone, Copy, Debug)]
 pub struct Softness {
     pub frequency_hz: f64,
@@ -29,23 +29,24 @@ impl Softness {
 pub struct Settings {
     pub dt_s: f64,
     pub gravity_m_s2: DVec3,
-    /// Number of sweeps that correct positions, and of rigid sweeps after them that do not. Without the
-    /// second kind, or if the next step began with their impulses, a held bottle would slip by a third
-    /// of a millimetre.
+    /// Number of sweeps that correct positions, and of rigid sweeps without correction after them. Without
+    /// the latter, or if the next step began with their impulses, a held bottle would slip by a third of a
+    /// millimetre.
     pub sweeps: usize,
     pub relaxing_sweeps: usize,
-    /// Softness of contacts between two moving things, and of contacts with fixed ones.
+    /// Softness of contacts between two moving bodies, and of contacts with fixed ones.
     pub contact: Softness,
     pub ground_contact: Softness,
     /// Penetration depth that is not corrected. At 0 a bottle precesses on its rim; at 1 mm hung frames slip.
     pub slop_m: f64,
     /// Maximum speed at which penetration is corrected.
     pub fastest_correction_m_s: f64,
-    /// Margin on the closing speed. A gap that would stay open even if it closed faster by this gets no row.
+    /// Margin on the closing speed. A gap that would stay open even at a closing speed higher by this margin
+    /// gets no row.
     pub margin_m_s: f64,
-    /// Maximum distance between a contact and the one of the last step that it continues.
+    /// Maximum distance between a contact point and the point of the last step that it continues.
     pub match_m: f64,
-    /// Share of an error of limits and equalities that is corrected per second.
+    /// Share of the error of limits and equalities that is corrected per second.
     pub joint_correction_per_s: f64,
 }
 
@@ -70,9 +71,9 @@ impl Settings {
 /// The two kinds of sweeps of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pass {
-    /// Corrects penetration and errors of joints. Its velocities move the positions.
+    /// Corrects penetration and joint errors. Its velocities move the positions.
     Correcting,
-    /// Rigid and without correction, so that pushing out of a wall leaves no speed behind. Its
-    /// velocities are those at the end of the step.
+    /// Rigid and without correction, so that correcting a penetration adds no velocity. Its velocities are
+    /// those at the end of the step.
     Relaxing,
 }

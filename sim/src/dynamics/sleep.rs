@@ -1,9 +1,9 @@
 //! Sleep: free bodies at rest are left out of steps until a moving body comes near.
 //!
 //! A body falls asleep, together with all bodies near it, when all of them have been still for a while. It
-//! keeps its contacts, and its velocity is exactly zero. It wakes when the bounds of an awake body meet its
-//! own, or when its state is set. All of this depends on the state alone, so that restored worlds continue
-//! exactly like the original ones.
+//! keeps its contacts, and its velocity is exactly zero. It wakes when its bounds meet those of an awake
+//! body, or when its state is set. All of this depends on the state alone, so a restored world continues
+//! exactly like the original.
 
 use std::collections::BTreeSet;
 
@@ -24,8 +24,7 @@ pub struct SleepingContacts {
 }
 
 impl Dynamics {
-    /// Lets a tree sleep, if it is a lone free body without equalities. It must be called before the first
-    /// step.
+    /// Lets a tree sleep if it is a lone free body without equalities. Call it before the first step.
     pub fn let_sleep(&mut self, id: TreeId) {
         let tree = &mut self.trees.all[id.index()];
         if tree.is_lone() && !self.solver.equalities.hold(id) {
@@ -33,7 +32,7 @@ impl Dynamics {
         }
     }
 
-    /// Wakes a body and all sleeping ones that it touches, directly or through others.
+    /// Wakes a body and all sleeping bodies that it touches, directly or through others.
     pub(super) fn wake(&mut self, id: TreeId) {
         let mut woken = BTreeSet::from([id]);
         loop {
@@ -76,7 +75,7 @@ impl Dynamics {
         }
     }
 
-    /// Returns the sleeping body of two, if the other one is awake.
+    /// Returns the sleeping one of two bodies if the other is awake.
     fn sleeper_beside_awake(&self, pair: [TreeId; 2]) -> Option<TreeId> {
         let [a, b] = pair.map(|id| self.trees.all[id.index()].is_asleep());
         (a != b).then(|| if a { pair[0] } else { pair[1] })
@@ -99,7 +98,7 @@ impl Dynamics {
         }
     }
 
-    /// Returns the bodies that are ready to sleep and near no body that is not ready.
+    /// Returns the bodies that are ready to sleep and are not near any body that is not ready.
     fn sleepers(&self) -> BTreeSet<TreeId> {
         let rest = |id: &TreeId| self.trees.all[id.index()].rest;
         let is_ready = |id: &TreeId| rest(id).is_some_and(Rest::is_ready);
@@ -136,7 +135,7 @@ impl Dynamics {
         let sleeps =
             |colliders| collision.trees_of(colliders).iter().flatten().any(|tree| sleepers.contains(tree));
         sleeping.touches.extend(solver.touches.extract_if(.., |touch| sleeps(touch.colliders)));
-        // Points of one pair keep their order.
+        // Points of one pair of colliders keep their order.
         sleeping.touches.sort_by_key(colliders_of);
         let (asleep, awake): (Vec<_>, Vec<_>) =
             manifolds.into_iter().partition(|manifold| sleeps(manifold.colliders));
@@ -150,8 +149,8 @@ impl Dynamics {
         self.trees.all.iter().filter_map(|tree| tree.rest).collect()
     }
 
-    /// Returns a view of all state of bodies that may sleep, for immediate serialisation; `None` in a world
-    /// without such bodies.
+    /// Returns a view of the state of all bodies that may sleep, for immediate serialisation. Returns `None`
+    /// in a world without such bodies.
     pub fn resting(&self) -> Option<impl Serialize> {
         let rests = self.rests();
         (!rests.is_empty()).then_some((rests, &self.sleeping))
@@ -167,7 +166,7 @@ mod tests {
 
     const HALF_M: f64 = 0.1;
 
-    /// Boxes on a floor, at these heights above each other and places along x.
+    /// Builds boxes on a floor, each at a height and a position along x.
     fn boxes(places_m: &[[f64; 2]]) -> (Bench, Vec<TreeId>) {
         let mut bench = Bench::with_floor(DOWN, sliding(0.6));
         let add = |place: &[f64; 2]| {

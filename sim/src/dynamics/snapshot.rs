@@ -31,7 +31,7 @@ pub struct DynamicsState {
 )]
 pub struct OtherWorld;
 
-/// [`DynamicsState`] by reference, without that of bodies that may sleep.
+/// [`DynamicsState`] by reference, without the state of bodies that may sleep.
 #[derive(Serialize)]
 struct PresentState<'a> {
     trees: Vec<TreeState>,
@@ -41,8 +41,8 @@ struct PresentState<'a> {
 }
 
 impl Dynamics {
-    /// Returns a view of the present state for immediate serialisation. [`Dynamics::resting`] has the rest of
-    /// the state.
+    /// Returns a view of the present state for immediate serialisation. [`Dynamics::resting`] returns the
+    /// rest of the state.
     pub fn present(&self) -> impl Serialize {
         PresentState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),

@@ -23,7 +23,7 @@ pub(super) type Errors = [f64; ERRORS];
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Covariance([Errors; ERRORS]);
 
-/// A measurement's non-zero derivatives by the errors.
+/// Non-zero derivatives of a measurement with respect to the errors.
 pub(super) struct MeasurementRow {
     parts: [(usize, f64); MAX_PARTS],
     len: usize,
@@ -150,7 +150,7 @@ impl Covariance {
     }
 }
 
-/// Measurements of one instant, one number after the other: each means  y = h . errors + noise.
+/// Measurements at one instant, processed one by one: each is  y = h . errors + noise.
 pub(super) struct Update<'a> {
     pub covariance: &'a mut Covariance,
     pub errors: Errors,
@@ -201,7 +201,7 @@ impl Update<'_> {
     }
 }
 
-/// Work for the widest vectors of the processor: the part of  k (P h)^T  for every row.
+/// Update on the widest vector registers of the processor: the part of  k (P h)^T  for every row.
 struct Taking<'a, 'b> {
     update: &'a mut Update<'b>,
     product: &'a Errors,

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 use crate::body::{JOINTS, LEG_JOINTS, LEGS, RobotModel};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// The estimate of one foot.
+/// Estimate of one foot.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Foot {
     /// Ankle roll link, to which the sole belongs.
     pub link: usize,
-    /// The point of the ground under the centre of pressure, world frame.
+    /// Point of the ground under the centre of pressure, world frame.
     pub point_m: DVec3,
     /// Heading of the foot since the robot has stood still.
     pub heading_rad: f64,
@@ -37,9 +37,9 @@ const LIFTED_N: f32 = 40.0;
 const STANDING_N: f32 = 110.0;
 const FORCE_FILTER_TIME_S: f32 = 0.006;
 const PRESSURE_FILTER_TIME_S: f32 = 0.015;
-/// Height above the other foot at which a foot no longer stands.
+/// Height above the other foot from which a foot no longer counts as standing.
 const HIGHER_M: f32 = 0.012;
-/// Damping of the least squares for a wrench: a stretched leg cannot feel along itself.
+/// Damping of the least squares for a wrench: a stretched leg has no torques from forces along it.
 const WRENCH_DAMPING: f32 = 2e-4;
 
 impl Foot {
@@ -164,7 +164,7 @@ fn ground_wrench(
     }
 }
 
-/// Returns the direction of the x axis, seen from above.
+/// Returns the heading of the x axis, seen from above.
 pub(super) fn facing_rad(rotation: DQuat) -> f64 {
     let forward = rotation * DVec3::X;
     forward.y.atan2(forward.x)

@@ -53,9 +53,9 @@ pub struct JointReadings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorReadings {
     pub joints: JointReadings,
-    /// Angular velocity of the pelvis, in its axes.
+    /// Angular velocity of the pelvis, in pelvis axes.
     pub gyro_rad_s: Vector,
-    /// Specific force at the IMU, its mean since the last reading, in the pelvis' axes: upwards 9.81 at rest.
+    /// Mean specific force at the IMU since the last reading, in pelvis axes; at rest 9.81 upwards.
     pub specific_force_m_s2: Vector,
 }
 
@@ -70,14 +70,14 @@ pub(crate) struct StateEstimator {
     acc_bias_m_s2: DVec3,
     feet: Sides<Foot>,
     covariance: Covariance,
-    /// Time for which both feet have stood while the pelvis hardly turned.
+    /// Time for which both feet have been on the floor while the pelvis hardly turned.
     still_s: f32,
-    /// Age of readings when they arrive.
+    /// Delay of the readings.
     latency_s: f32,
 }
 
-/// Noise of a gyro and an accelerometer reading at 200 Hz. Velocities change by less than a third for
-/// three times more or less.
+/// Noise of gyro and accelerometer readings at 200 Hz. With a third or three times of it, velocities change
+/// by less than a third.
 const GYRO_NOISE_RAD_S: f64 = 4e-3;
 const ACC_NOISE_M_S2: f64 = 0.1;
 /// Random walks of the biases, per root of a second.
@@ -89,13 +89,13 @@ const STILL_WALK_M: f64 = 5e-4;
 const STEPPING_WALK_M: f64 = 3e-3;
 const FLYING_WALK_M: f64 = 3.0;
 const STILL_HEADING_WALK_RAD: f64 = 1e-3;
-/// Noise of kinematics: encoders, and legs that yield.
+/// Noise of kinematics: encoder errors and yielding legs.
 const POINT_NOISE_M: f64 = 5e-4;
 const HEADING_NOISE_RAD: f64 = 2e-3;
 const FLOOR_NOISE_M: f64 = 4e-3;
-/// Squared number of standard deviations beyond which a foot has slipped from its place.
+/// Squared number of standard deviations beyond which a foot counts as having slipped.
 const SLIP_GATE: f64 = 9.0;
-/// Minimum time of standing still, and maximum spin, for using the feet to estimate the heading.
+/// Minimum time of standing still, and maximum angular velocity, for estimating the heading from the feet.
 const STILL_S: f32 = 0.4;
 const STILL_RAD_S: f32 = 0.1;
 /// Minimum certainty at which a foot counts as standing on the floor.
@@ -109,9 +109,9 @@ const START_ACC_BIAS_M_S2: f64 = 2e-2;
 const START_KNOWN: f64 = 1e-4;
 
 impl StateEstimator {
-    /// Creates the estimator of a robot that has stood long enough for its accelerometer's mean,
-    /// `still_force_m_s2`, to determine its tilt. It takes place and heading from `world_from_pelvis`.
-    /// Readings arrive `latency_s` late.
+    /// Creates the estimator of a robot that has stood long enough for the mean of its accelerometer,
+    /// `still_force_m_s2`, to determine its tilt. Position and heading are those of `world_from_pelvis`.
+    /// Readings are delayed by `latency_s`.
     pub(crate) fn new(
         model: &RobotModel,
         world_from_pelvis: &Pose,
@@ -151,8 +151,8 @@ impl StateEstimator {
         }
     }
 
-    /// Processes one reading, `dt_s` after the last one. Returns the poses of all links in the pelvis
-    /// frame, by the joints.
+    /// Processes one reading, `dt_s` after the last one. Returns the poses of all links in the pelvis frame,
+    /// from the joint readings.
     pub(crate) fn update(&mut self, model: &RobotModel, readings: &SensorReadings, dt_s: f32) -> Vec<Pose> {
         self.predict(readings, f64::from(dt_s));
         let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &readings.joints.q_rad);
@@ -296,7 +296,7 @@ impl StateEstimator {
     }
 }
 
-/// Returns the same angle within half a turn of zero.
+/// Returns the equivalent angle within half a turn of zero.
 fn wrapped_rad(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }

@@ -10,21 +10,21 @@ use super::{Balance, BaseLimits, Locomotion, MotorController};
 use crate::SimError;
 use crate::body::{BodyScale, RobotModel};
 
-/// Choice of a base controller. Cheap to clone: a file is read and checked once, and robots share its
+/// Choice of a base controller. Clones are cheap: a file is read and checked once, and robots share its
 /// network.
 #[derive(Clone, Debug, Default)]
 pub enum LocomotionChoice {
     /// Tandem's own controller.
     #[default]
     Balance,
-    /// A velocity policy from an ONNX file, with a loop over its place if `looped` is true.
+    /// A velocity policy from an ONNX file, with a position loop if `looped` is true.
     #[cfg(feature = "onnx")]
     Onnx { network: Arc<Network>, looped: bool },
 }
 
 impl LocomotionChoice {
-    /// Reads the policy of a file. With `looped`, the policy receives the velocity that keeps the robot
-    /// where the commands would have taken it, rather than the commands.
+    /// Reads the policy of a file. If `looped` is true, a position loop replaces the commands: the policy
+    /// receives the velocity that keeps the robot at the place to which the commands would have moved it.
     ///
     /// # Errors
     ///
@@ -57,12 +57,12 @@ impl LocomotionChoice {
         }
     }
 
-    /// Returns the base commands that such a controller follows with a robot of this size.
+    /// Returns the base commands that the controller follows with a robot of this size.
     pub fn limits(&self, scale: &BodyScale) -> BaseLimits {
         self.controller().limits(scale)
     }
 
-    /// Checks that such a controller can move this robot.
+    /// Checks that the controller can move this robot.
     ///
     /// # Errors
     ///
@@ -75,7 +75,7 @@ impl LocomotionChoice {
         }
     }
 
-    /// Checks that such a controller can move this robot; Tandem's own always can.
+    /// Checks that the controller can move this robot, which Tandem's own controller always can.
     #[cfg(not(feature = "onnx"))]
     pub fn check_robot(&self, _model: &RobotModel) -> Result<(), String> {
         match self {
@@ -83,8 +83,8 @@ impl LocomotionChoice {
         }
     }
 
-    /// Returns the name in recordings and results: `balance`, or the file's name with a hash of its
-    /// content, prefixed with `looped:` for a loop.
+    /// Returns the name in recordings and results: `balance`, or the file's name with a hash of its content.
+    /// The prefix `looped:` marks a position loop.
     pub fn name(&self) -> String {
         match self {
             LocomotionChoice::Balance => "balance".into(),

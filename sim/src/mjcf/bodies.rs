@@ -12,7 +12,7 @@ use rapier3d::prelude::MassProperties;
 use super::{Document, Geom, LinkJoint, Primitive, Site, pose, vector};
 use crate::{SimError, mass};
 
-/// A top-level body, including all bodies that it carries.
+/// Top-level body with all bodies that it carries.
 #[derive(Clone, Debug)]
 pub struct BodyTree {
     /// Parents before children.
@@ -46,7 +46,7 @@ pub struct PlacedBody {
     /// Index among the bodies of the file; 0 is the world.
     pub index: usize,
     pub link_from_body: DPose3,
-    /// Indices of its geoms among the link's.
+    /// Indices of the body's geoms among the link's.
     pub geoms: Range<usize>,
 }
 
@@ -56,7 +56,7 @@ impl BodyTree {
         self.links.iter().all(|link| link.joint == LinkJoint::Fixed)
     }
 
-    /// Returns the link that a body is part of, and the body's pose in its frame.
+    /// Returns the link that contains a body, and the body's pose in the link's frame.
     pub fn body(&self, name: &str) -> Option<(usize, DPose3)> {
         self.links.iter().enumerate().find_map(|(index, link)| {
             let body = link.bodies.iter().find(|body| body.name == name)?;
@@ -65,7 +65,7 @@ impl BodyTree {
     }
 }
 
-/// The link that a body of the file became part of.
+/// Link of which a body of the file became part.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub tree: usize,
@@ -111,7 +111,7 @@ impl Document {
         Ok(trees)
     }
 
-    /// Scales all masses to the total mass that the file states, if any. The world has no mass.
+    /// Scales all masses to the total mass in the file, if the file gives one. The world has no mass.
     fn set_total_mass(&self, trees: &mut [BodyTree]) {
         let stated_kg = self.model.compiler.set_total_mass as f32;
         let mut links: Vec<_> = trees.iter_mut().skip(1).flat_map(|tree| &mut tree.links).collect();

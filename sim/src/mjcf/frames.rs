@@ -1,5 +1,4 @@
-//! Named frames of a file, by which other code finds places: sites, which are points and regions, and
-//! cameras.
+//! Named frames of a file, which other code refers to: sites, which are points or regions, and cameras.
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
@@ -69,7 +68,7 @@ impl MjcfCamera {
 const DEFAULT_FOVY_DEG: f32 = 45.0;
 const DEFAULT_RESOLUTION_PX: (u32, u32) = (320, 240);
 
-/// Reads the cameras. One that the program uses is refused if it cannot be read, unless `may_lack`.
+/// Reads the cameras. A camera that the program uses is refused if it cannot be read, unless `may_lack`.
 pub(super) fn cameras(source: &MjcfText, may_lack: bool) -> Result<Vec<MjcfCamera>, SimError> {
     let xml = source.xml()?;
     let mut found = Vec::new();
@@ -87,7 +86,7 @@ pub(super) fn cameras(source: &MjcfText, may_lack: bool) -> Result<Vec<MjcfCamer
 /// Names of the cameras that the program uses.
 const USED: [&str; 2] = ["third_person", "egocentric"];
 
-/// Returns the advice for a camera that cannot be read; `None` for one that can.
+/// Returns the advice for a camera that cannot be read. Returns `None` for a readable camera.
 fn unreadable(node: &roxmltree::Node) -> Option<&'static str> {
     let has = |names: &[&str]| names.iter().any(|name| node.has_attribute(*name));
     let parent = node.parent()?;
@@ -104,7 +103,7 @@ fn unreadable(node: &roxmltree::Node) -> Option<&'static str> {
 }
 
 fn camera(node: &roxmltree::Node) -> MjcfCamera {
-    // Their number and finiteness have been checked.
+    // The number of values and their finiteness have been checked.
     let numbers = |attribute: &str| -> Option<Vec<f32>> {
         let words = node.attribute(attribute)?.split_whitespace();
         Some(words.filter_map(|word| word.parse().ok()).collect())

@@ -34,11 +34,11 @@ pub enum Primitive {
     Plane {
         half_extents_m: [f32; 2],
     },
-    /// The hull of some points.
+    /// Hull of a set of points.
     Convex {
         vertices_m: Vec<Vector>,
     },
-    /// Drawn as the mesh itself; it collides as its hull, as in MuJoCo.
+    /// Drawn as the mesh itself. Collides as its hull, as in MuJoCo.
     Mesh(Arc<Mesh>),
 }
 
@@ -48,18 +48,18 @@ pub struct Geom {
     pub name: Option<String>,
     pub primitive: Primitive,
     pub body_from_geom: Pose,
-    /// Colour, and the share of light from behind that it keeps out.
+    /// Colour and opacity.
     pub rgba: [f32; 4],
     pub gloss: Gloss,
     pub material: Option<String>,
-    /// The image of the material's texture, if it has one. `rgba` is its mean colour then.
+    /// Image of the material's texture, if it has one. `rgba` is then the image's mean colour.
     pub image: Option<SurfaceImage>,
     /// The two colours of the material's builtin texture if its pattern is tiles.
     pub checker_rgb: Option<[[f32; 3]; 2]>,
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
-    /// True if its mask, or a pair, lets it touch another geom.
+    /// True if its mask or a pair lets it touch another geom.
     pub collides: bool,
     pub touches: Mask,
     pub drawn: bool,
@@ -68,9 +68,9 @@ pub struct Geom {
 
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
-/// Dimensions of the slab as which a plane collides: its thickness, which no object passes, and its reach
-/// around nearby shapes. Planes of any drawn size are endless, as in MuJoCo. Half-spaces have no mass centre
-/// and no bounds.
+/// Dimensions of the slab that represents a plane in collisions: its thickness, which no object passes, and
+/// its extent around nearby shapes. Planes of any drawn size are endless, as in MuJoCo. Half-spaces have no
+/// centre of mass and no bounds.
 const PLANE_THICKNESS_M: f32 = 2.0;
 const PLANE_REACH_M: f32 = 50.0;
 
@@ -173,7 +173,8 @@ fn is_paired(document: &Document, geom: &mjcf_rs::body::Geom) -> bool {
     geom.name.as_ref().is_some_and(|name| document.pairs.iter().any(|pair| pair.has(name)))
 }
 
-/// Returns the shape of a geom; `half_length_m` is that of a shape between two ends.
+/// Returns the shape of a geom; `half_length_m` is half the distance between the two ends, if the geom has
+/// ends.
 fn primitive(
     document: &Document,
     geom: &mjcf_rs::body::Geom,
@@ -218,8 +219,7 @@ fn primitive(
     Ok(primitive)
 }
 
-/// Returns the geom's own colour, or its material's; a flat texture or an image on the material
-/// tints it.
+/// Returns the geom's own colour, or its material's. A flat texture or an image of the material tints it.
 fn rgba(
     document: &Document,
     geom: &mjcf_rs::body::Geom,
@@ -240,7 +240,7 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority, left: 1.0 })
 }
 
-/// Returns the two colours of a builtin texture; MuJoCo's own if the file gives none.
+/// Returns the two colours of a builtin texture, or MuJoCo's defaults if the file gives none.
 fn builtin_rgb(texture: &mjcf_rs::assets::Texture) -> [[f32; 3]; 2] {
     let rgb = [texture.rgb1.unwrap_or([0.8; 3]), texture.rgb2.unwrap_or([0.5; 3])];
     rgb.map(|rgb| rgb.map(|c| c as f32))
@@ -270,7 +270,7 @@ fn mesh(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Primitive, St
     })
 }
 
-/// Returns points of a Fibonacci sphere, scaled: an ellipsoid's convex hull for collision.
+/// Returns the scaled points of a Fibonacci sphere, whose hull is the collision shape of an ellipsoid.
 fn ellipsoid_points(radii_m: Vector) -> Vec<Vector> {
     const POINTS: usize = 96;
     const GOLDEN_ANGLE_RAD: f32 = 2.399_963_2;

@@ -13,7 +13,7 @@ use super::text::stated::Classes;
 use crate::SimError;
 use crate::dynamics::Axis;
 
-/// Freedom of a body relative to its parent.
+/// Joint of a body relative to its parent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkJoint {
     Fixed,
@@ -29,10 +29,10 @@ pub enum LinkJoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// The effort has no limit here: the actuator has one. The joint position is 0 where the file places the
-    /// bodies.
+    /// Axis without an effort limit, which is part of the actuator. The joint position is 0 where the file
+    /// places the bodies.
     pub axis: Axis,
-    /// Joint position in the file where the file places the bodies: its `ref`.
+    /// Joint position in the file's coordinates where the file places the bodies: its `ref`.
     pub placed_at: f64,
 }
 
@@ -44,11 +44,11 @@ pub struct Actuator {
     /// Range to which commands are clamped.
     pub control_range: Option<[f64; 2]>,
     pub effort_range: Option<[f64; 2]>,
-    /// Speed (rad/s or m/s) at which the actuator can push no further.
+    /// Speed (rad/s or m/s) at which the actuator exerts no effort in the direction of motion.
     pub speed_limit: Option<f64>,
     /// Factor on the commands of a motor (with its gain), and divisor of position commands.
     pub gear: f64,
-    /// Joint position in the file where the file places the bodies: the `ref` of the joint.
+    /// Joint position in the file's coordinates where the file places the bodies: the `ref` of the joint.
     pub placed_at: f64,
     /// Index among all actuators of the file, some of which have no effect.
     pub index: usize,
@@ -78,10 +78,10 @@ pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimErr
     Ok(limits.map(words))
 }
 
-/// Ranges by the names of joints, which `mjcf-rs` does not read.
+/// Ranges that `mjcf-rs` does not read, by joint name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct UnreadRanges {
-    /// `actuatorfrcrange` of a joint: the limits of the total effort of all its actuators.
+    /// `actuatorfrcrange` of a joint: the limits of the total effort of all actuators on it.
     effort: BTreeMap<String, [f64; 2]>,
     /// `inheritrange` of a position actuator: the width of its `ctrlrange` as a multiple of the joint's
     /// range.
@@ -121,13 +121,13 @@ impl UnreadRanges {
     }
 }
 
-/// Effort of an actuator for its command, without its gear.
+/// Effort of an actuator as a function of its command, without its gear.
 enum Law {
     Motor { gain: f64 },
     Position { kp: f64, kd: f64 },
 }
 
-/// Returns the law of an actuator; `None` for one that is not supported and has no effect.
+/// Returns the law of an actuator. Returns `None` for an unsupported actuator, which has no effect.
 fn law(element: &ActuatorElement) -> Option<Law> {
     match element.kind {
         Kind::Motor => Some(Law::Motor { gain: 1.0 }),
@@ -139,7 +139,7 @@ fn law(element: &ActuatorElement) -> Option<Law> {
     }
 }
 
-/// Returns the law of a `<general>`, if it is a motor or a position actuator. MuJoCo's force is gain * control
+/// Returns the law of a `<general>` that is a motor or a position actuator. MuJoCo's force is gain * control
 /// + bias, with a bias of b0 + b1 q + b2 q' if it is affine.
 fn general_law(element: &ActuatorElement) -> Option<Law> {
     let is = |stated: &Option<String>, usual: &str| stated.as_deref().unwrap_or(usual) == usual;
@@ -182,7 +182,7 @@ impl LinkJoint {
         }
     }
 
-    /// Returns the count of numbers in MuJoCo's `qvel`.
+    /// Returns the number of elements in MuJoCo's `qvel`.
     pub fn freedoms(&self) -> usize {
         match self {
             LinkJoint::Fixed => 0,
@@ -191,7 +191,7 @@ impl LinkJoint {
         }
     }
 
-    /// Returns the count of numbers in MuJoCo's `qpos`: a free joint has a position and a quaternion.
+    /// Returns the number of elements in MuJoCo's `qpos`: a free joint has a position and a quaternion.
     pub fn coordinates(&self) -> usize {
         match self {
             LinkJoint::Fixed => 0,
@@ -220,8 +220,8 @@ impl Document {
         acting.map(|(index, element)| self.actuator(index, element, limit(index))).collect()
     }
 
-    /// Reads an actuator. Gains and efforts are those of the joint: a gear g multiplies efforts by g and
-    /// gains of positions by g^2.
+    /// Reads an actuator. Gains and efforts are converted to those of the joint: a gear g multiplies efforts
+    /// by g and position gains by g^2.
     fn actuator(
         &self,
         index: usize,
@@ -313,7 +313,7 @@ impl Document {
             }
             JointType::Free => Ok(LinkJoint::Free { name }),
             JointType::Slide => Ok(LinkJoint::Slide(self.axis(name, joint).map_err(|what| refuse(&what))?)),
-            // Balls have been split into hinges.
+            // Ball joints have been split into hinges.
             JointType::Hinge | JointType::Ball => {
                 Ok(LinkJoint::Hinge(self.axis(name, joint).map_err(|what| refuse(&what))?))
             }
@@ -334,7 +334,7 @@ impl Document {
         Ok(AxisJoint { name, axis, placed_at: joint.ref_ })
     }
 
-    /// Returns a range if it limits a quantity; `what` is the quantity's name.
+    /// Returns a range if it is in effect; `what` is the name of the limited quantity.
     fn limits(
         &self,
         what: &str,

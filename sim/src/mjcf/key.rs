@@ -1,4 +1,4 @@
-//! Keys of a file: states, and the actuators' controls at a time.
+//! Keys of a file: each is a state, with the actuators' controls and a time.
 
 use super::{Document, LinkJoint};
 use crate::SimError;
@@ -10,8 +10,8 @@ pub struct Key {
     pub time_s: f64,
     /// The coordinates of all joints, in the order of [`Document::trees`]; see [`LinkJoint::coordinates`].
     pub positions: Vec<f64>,
-    /// A number for each degree of freedom; a free joint has its velocity in world axes and its spin in
-    /// its body's axes.
+    /// One number per degree of freedom. A free joint has its velocity in world axes and its angular velocity
+    /// in body axes.
     pub velocities: Vec<f64>,
     /// Controls of the actuators, in the order of [`Document::actuators`].
     pub controls: Vec<f64>,
@@ -31,8 +31,8 @@ impl Document {
                 have => Err(self
                     .unsupported(format!("key `{name}` has {have} numbers in {what}; it takes {expected}"))),
             };
-            // MuJoCo has a quaternion for a ball joint; here it has three angles. A file with balls
-            // therefore starts where its bodies are placed.
+            // MuJoCo has a quaternion for a ball joint; here it has three angles. A file with ball joints
+            // therefore starts with its bodies as placed.
             let has_ball = self.split.ball.is_some();
             let positions = if has_ball { Vec::new() } else { numbers("qpos", &key.qpos, coordinates)? };
             let mut rest = positions.as_slice();

@@ -1,4 +1,4 @@
-//! Light that a file states: its `<light>` elements, and the headlight of `<visual>`.
+//! Lights of a file: its `<light>` elements, and the headlight of `<visual>`.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use roxmltree::Node;
@@ -8,12 +8,12 @@ use super::text::source::MjcfText;
 use super::text::stated::Classes;
 use crate::SimError;
 
-/// Light of a file. Colours are those of the file: they multiply its colours as they are, without a
-/// conversion to linear light.
+/// Lights of a file. As in MuJoCo, light colours multiply surface colours directly, without conversion to
+/// linear light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FileLights {
     pub headlight: Headlight,
-    /// At most [`MAX_LIGHTS`], without those that are not active.
+    /// At most [`MAX_LIGHTS`]; lights that are not active are left out.
     pub lights: Vec<FileLight>,
 }
 
@@ -25,7 +25,7 @@ pub struct Headlight {
     pub specular_rgb: Vector,
 }
 
-/// A light that a body carries.
+/// A light fixed to a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileLight {
     pub kind: LightKind,
@@ -33,14 +33,14 @@ pub struct FileLight {
     pub(crate) body: usize,
     /// Position in the frame of the body, or of the body that this one is part of.
     pub position_m: Vector,
-    /// Unit vector along which it shines.
+    /// Unit vector of the light's direction.
     pub direction: Vector,
     pub ambient_rgb: Vector,
     pub diffuse_rgb: Vector,
     pub specular_rgb: Vector,
-    /// Constant, linear and quadratic terms of the distance in metres, by which the light is divided.
+    /// Constant, linear and quadratic coefficients of the distance (m) in the divisor of the light.
     pub attenuation_values: [f32; 3],
-    /// Angle from the direction beyond which a spot does not shine.
+    /// Angle from the direction beyond which a spot emits no light.
     pub cutoff_rad: f32,
     /// Exponent of the cosine of that angle.
     pub exponent_value: f32,
@@ -59,7 +59,7 @@ pub enum LightKind {
 pub const MAX_LIGHTS: usize = 7;
 
 impl Default for Headlight {
-    /// Returns MuJoCo's own.
+    /// Returns MuJoCo's default.
     fn default() -> Headlight {
         let grey = Vector::splat;
         Headlight { ambient_rgb: grey(0.1), diffuse_rgb: grey(0.4), specular_rgb: grey(0.5) }
@@ -87,7 +87,7 @@ impl Headlight {
 }
 
 impl FileLight {
-    /// Returns the light in another frame, in which its own has the pose `frame_from_own`.
+    /// Returns the light in another frame, in which the light's present frame has the pose `frame_from_own`.
     pub(crate) fn moved(&self, frame_from_own: &Pose) -> FileLight {
         FileLight {
             position_m: *frame_from_own * self.position_m,
@@ -96,7 +96,7 @@ impl FileLight {
         }
     }
 
-    /// Returns the light shining at the first place of a body.
+    /// Returns the light aimed at the initial position of a body.
     fn aimed(self, model: &mjcf_rs::Model, target: usize) -> FileLight {
         let own_from_world = world_from_body(model, self.body).inverse();
         let target_m = own_from_world * world_from_body(model, target).translation;
@@ -131,8 +131,9 @@ impl FileLight {
     }
 }
 
-/// Returns the lights of a file; `None` if it states none, nor a headlight. `bodies` has the places in the
-/// text at which the bodies begin; that of a body which was split is that of its last part.
+/// Returns the lights of a file. Returns `None` if the file has neither lights nor a headlight. `bodies` has
+/// the positions in the text at which the bodies begin. For a body that was split, it is the position of the
+/// last part.
 pub(super) fn lights(
     source: &MjcfText,
     model: &mjcf_rs::Model,
@@ -167,7 +168,7 @@ pub(super) fn lights(
 }
 
 impl Document {
-    /// Returns the lights of the file; `None` if it states none.
+    /// Returns the lights of the file. Returns `None` if the file has none.
     pub fn lights(&self) -> Option<&FileLights> {
         self.lights.as_ref()
     }

@@ -56,10 +56,10 @@ use text::settings::FileSettings;
 use text::source::{self, MjcfText};
 use text::split::{Split, split};
 
-/// Excess of a joint position over its range from which a note names the joint.
+/// Excess of a joint position beyond its range above which a note names the joint.
 const MIN_EXCESS_RAD_OR_M: f64 = 0.01;
 
-/// Files are equal if they have the same name and content.
+/// Files are equal if their names and contents are.
 impl PartialEq for Document {
     fn eq(&self, other: &Document) -> bool {
         self.file == other.file && self.fingerprint() == other.fingerprint()
@@ -78,9 +78,9 @@ pub struct Document {
     source: MjcfText,
     checked: Checked,
     split: Split,
-    /// Folder that the file's references are relative to.
+    /// Folder to which the file's references are relative.
     folder: PathBuf,
-    /// Content of the files that assets name, by asset.
+    /// Contents of the mesh files, by asset name.
     meshes: BTreeMap<String, Arc<Mesh>>,
     textures: BTreeMap<String, Arc<Texture>>,
     /// Textures that MuJoCo draws itself, by name.
@@ -229,7 +229,7 @@ impl Document {
         self.checked.approximated.extend(told);
     }
 
-    /// Returns a note on the joints that begin beyond their ranges, and the first of them.
+    /// Returns a note on the joints that begin beyond their ranges, with the first of them.
     fn beyond_range(&self) -> Option<String> {
         let bodies = self.checked.bodies.iter().enumerate();
         let mut beyond = bodies.filter_map(|(body, bytes)| {
@@ -253,7 +253,7 @@ impl Document {
         ))
     }
 
-    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.
+    /// Returns the elements of the file that only approximate MuJoCo, one per line with its first position.
     pub fn approximations(&self) -> &[String] {
         &self.checked.approximated
     }
@@ -263,7 +263,7 @@ impl Document {
         if self.settings.falls { self.model.option.gravity } else { [0.0; 3] }
     }
 
-    /// Returns a hash of the content, including all files that it includes and names; comments do not count.
+    /// Returns a hash of the content, including all files that it includes and names. Comments do not count.
     /// For a document that was read from a file, it is the hash of the file, even if the document has been
     /// changed since.
     pub fn fingerprint(&self) -> u64 {
@@ -274,7 +274,7 @@ impl Document {
             self.textures.iter().map(|(name, texture)| (name, texture.mean_rgb)).collect();
         let read = (&self.model, &self.cameras, &self.meshes, texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");
-        // Fields that older versions did not read keep the hash unchanged where a file does not use them.
+        // Fields that older versions did not read leave the hash unchanged if a file does not use them.
         if self.unread != UnreadRanges::default() {
             content += &format!("{:?}", self.unread);
         }
@@ -293,7 +293,8 @@ impl Document {
         xxh3_64(content.as_bytes())
     }
 
-    /// Returns the image of the sky, or the six of a cube around the camera: the first texture of that type.
+    /// Returns the image of the sky, or six images of a cube around the camera, from the first texture of
+    /// type `skybox`.
     pub fn sky(&self) -> Option<&Arc<Texture>> {
         self.sky.as_ref()
     }

@@ -1,5 +1,5 @@
-//! Changes to the file of a robot before it is used: other content of the file is left out, and bodies get
-//! frames in which robots are computed.
+//! Changes to a robot's file before it is used: other content is removed, and bodies get the frames in which
+//! robots are computed.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::SimError;
 const LEFT_OUT: &[&str] = &["tendon", "pair", "deformable", "skin", "flex", "flexvert", "flexstrain"];
 
 impl Document {
-    /// Reads the file of a robot. Only bodies, joints and limits count.
+    /// Reads the file of a robot. Only bodies, joints and limits are used.
     ///
     /// # Errors
     ///
@@ -72,8 +72,8 @@ impl Document {
         tree.ok_or_else(|| self.unsupported("it has no body"))
     }
 
-    /// Lets the simple shapes of a body and of those fixed to it collide if none of its geoms does. Files that
-    /// state pairs of geoms have such bodies.
+    /// Lets the simple shapes of a body and of the bodies fixed to it collide if none of its geoms does.
+    /// Files with pairs of geoms have such bodies.
     pub(crate) fn let_shapes_collide(&mut self, body: usize) {
         let is_on = |id: usize| {
             let above = std::iter::successors(Some(id), |id| self.model.bodies[*id].parent);
@@ -136,8 +136,8 @@ impl Document {
     }
 }
 
-/// Sets pose and size of a geom that its file places between two ends. In another frame, the same ends would
-/// turn a box about the line between them.
+/// Sets pose and size of a geom that its file defines by two end points. In another frame, the same ends
+/// would turn a box about the line between them.
 fn set_pose(geom: &mut Geom, ends_m: [f64; 6]) {
     let (body_from_geom, half_length_m) = between(ends_m);
     let Pose { rotation, translation, .. } = body_from_geom;

@@ -1,32 +1,32 @@
-//! Bodies of a scene that can move, by name. Tasks can refer to these; all other bodies are part of the room.
+//! Movable bodies of a scene, by name. Tasks can refer to these; all other bodies are part of the room.
 
 use rapier3d::math::Pose;
 
 use super::{BodyLink, BodyTree, Document, pose};
 use crate::SimError;
 
-/// A body of a scene that a joint moves, or that carries such a body.
+/// Body of a scene that a joint moves, or that carries such a body.
 #[derive(Clone, Debug)]
 pub struct SceneBody {
     pub link: BodyLink,
     /// Pose as the file places it.
     pub scene_from_body: Pose,
-    /// Name of the body that carries it; `None` if the world does.
+    /// Name of the body that carries this one; `None` for the world.
     pub carrier: Option<String>,
 }
 
 impl Document {
-    /// Returns the bodies of a scene that can move, and those that carry them, in the order of the file.
+    /// Returns the movable bodies of a scene and the bodies that carry them, in file order.
     pub fn scene_bodies(&self) -> Result<Vec<SceneBody>, SimError> {
         let trees = self.trees()?;
         Ok(trees.iter().filter(|tree| !tree.is_fixed()).flat_map(bodies_of).collect())
     }
 
-    /// Returns the body of a scene that can move and has this name.
+    /// Returns the movable body of a scene with this name.
     ///
     /// # Errors
     ///
-    /// Returns an error if there is no such body, or several; it names the bodies that there are.
+    /// Returns an error with the available names if there is no such body, or several.
     pub fn scene_body(&self, name: &str) -> Result<SceneBody, SimError> {
         let mut bodies = self.scene_bodies()?;
         let named = bodies.iter().filter(|body| body.link.name == name).count();

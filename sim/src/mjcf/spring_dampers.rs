@@ -1,4 +1,4 @@
-//! Springs and dampers of joints that a file states by their time constant and damping ratio.
+//! Joint springs and dampers that a file specifies by time constant and damping ratio.
 
 use rapier3d::glamx::DPose3;
 use rapier3d::prelude::MassProperties;
@@ -29,7 +29,8 @@ impl Document {
     }
 }
 
-/// Returns the inertia that the joint of a link moves: that of all bodies on the link, and the armature.
+/// Returns the inertia that a link's joint moves: that of the link and all bodies it carries, and the
+/// armature.
 fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
     let mut of_link: Vec<Option<DPose3>> = vec![None; tree.links.len()];
     of_link[link] = Some(DPose3::IDENTITY);
@@ -60,7 +61,7 @@ fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
 mod tests {
     use crate::mjcf::Document;
 
-    /// Stiffness and damping of the same file in MuJoCo 4.0.0.
+    /// Stiffness and damping in MuJoCo 4.0.0 for the same file.
     const EXPECTED: [[f64; 2]; 2] = [[8.39738443, 2.14973041], [50.0, 10.0]];
 
     #[test]

@@ -1,4 +1,4 @@
-//! Blurred colours, for example of a lens out of focus.
+//! Gaussian blur of an image's colours, for example for a lens out of focus.
 
 use super::Camera;
 
@@ -19,7 +19,7 @@ pub(super) fn blurred(rgb: Vec<u8>, camera: &Camera) -> Vec<u8> {
     both.into_iter().map(|value| value.round() as u8).collect()
 }
 
-/// Returns weights that add up to 1, the middle one first.
+/// Returns the kernel's weights from the middle outwards. The whole symmetric kernel sums to 1.
 fn kernel(blur_px: f32) -> Vec<f32> {
     let reach = (REACH * blur_px).ceil() as usize;
     let weights: Vec<f32> = (0..=reach).map(|i| (-0.5 * (i as f32 / blur_px).powi(2)).exp()).collect();
@@ -27,7 +27,7 @@ fn kernel(blur_px: f32) -> Vec<f32> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// Blurs along `lines` lines of `length` pixels; `at` gives the index of the red value of a line's pixel.
+/// Blurs along `lines` lines of `length` pixels; `at(pixel, line)` is the index of the pixel's red value.
 fn spread(
     from_values: &[f32],
     weight_values: &[f32],
@@ -68,8 +68,8 @@ mod tests {
         assert_eq!(blurred(point.clone(), &camera(0.0)), point);
         for blur_px in [0.7_f32, 1.5] {
             let seen = blurred(point.clone(), &camera(blur_px));
-            // The middle of a Gaussian of two dimensions is 1 / (2 pi sigma^2), up to the discretisation
-            // of the pixel grid.
+            // The peak of a two-dimensional Gaussian is 1 / (2 pi sigma^2), up to the discretisation of the
+            // pixel grid.
             let middle = f32::from(seen[(7 * 21 + 10) * 3]);
             let expected = 255.0 / (std::f32::consts::TAU * blur_px.powi(2));
             assert!((middle - expected).abs() < 0.15 * expected + 1.0, "{blur_px}: {middle}, not {expected}");

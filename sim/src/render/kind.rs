@@ -12,9 +12,9 @@ pub enum RendererKind {
     /// A GPU if there is one, otherwise the embedded renderer.
     #[default]
     Auto,
-    /// The embedded one.
+    /// The embedded renderer.
     Cpu,
-    /// A GPU, or software in its place.
+    /// A GPU, or a software renderer in its place.
     Gpu,
     /// Path tracing on the CPU.
     Path,
@@ -47,7 +47,7 @@ impl RendererKind {
         }
     }
 
-    /// Creates a renderer for a scenery. If a GPU cannot be used, it is the embedded renderer.
+    /// Creates a renderer for a scenery. Falls back to the embedded renderer if a GPU cannot be used.
     pub fn renderer(self, scenery: Scenery) -> Box<dyn Renderer> {
         match self {
             RendererKind::Auto if on_real_gpu().is_some() => gpu(scenery),
@@ -73,7 +73,7 @@ fn on_gpu() -> Result<String, SimError> {
     Err(SimError::WithoutGpu)
 }
 
-/// Describes a hardware GPU; `None` if there is none or only a software renderer.
+/// Describes a hardware GPU. Returns `None` if there is none or only a software renderer.
 #[cfg(feature = "gpu")]
 fn on_real_gpu() -> Option<String> {
     super::gpu::is_real().then(on_gpu).and_then(Result::ok)

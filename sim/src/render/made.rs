@@ -8,7 +8,7 @@ use super::{Carrier, Part, Pattern, TriangleMesh};
 use crate::mjcf::Gloss;
 use crate::{ObjectPlacement, RobotPlacement, World, WorldSpec};
 
-/// Returns a box of a room.
+/// Returns a box that is part of the room.
 pub fn cuboid(half_m: Vector, at_m: Vector, rgb: [f32; 3]) -> Part {
     Part {
         mesh: TriangleMesh::cuboid(half_m).into(),

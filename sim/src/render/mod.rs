@@ -1,7 +1,7 @@
 //! Images of a world: RGB, metric depth and instance ids for any camera.
 //!
 //! [`Scenery`] is everything visible, built once per world; a [`Step`] gives the poses; a [`Renderer`],
-//! chosen by [`RendererKind`], draws it. The embedded one has no system requirements.
+//! chosen by [`RendererKind`], draws it. The embedded renderer has no system requirements.
 
 mod baked;
 mod blur;
@@ -35,12 +35,12 @@ use crate::Step;
 #[cfg(feature = "gpu")]
 use gpu::colours as together;
 
-/// A renderer of the scenery that it was made for.
+/// Renderer of one scenery.
 pub trait Renderer: Send {
     /// Returns the name of the renderer and its device.
     fn name(&self) -> &str;
 
-    /// Renders the image of each camera after `step`, in their order. They may be drawn in parallel.
+    /// Renders the images of all `cameras` after `step`, in their order. Images may be drawn in parallel.
     fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame>;
 
     /// Renders the image of `camera` after `step`.
@@ -48,13 +48,13 @@ pub trait Renderer: Send {
         self.render_all(step, slice::from_ref(camera)).swap_remove(0)
     }
 
-    /// Renders only the colours of the image of `camera` after `step`, as [`Frame::rgb`], on this
-    /// thread: for callers with their own threads.
+    /// Renders only the colours of the image of `camera` after `step`, in the format of [`Frame::rgb`], on
+    /// the calling thread. It serves callers with their own threads.
     fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
         self.render(step, camera).rgb
     }
 
-    /// Returns true if [`render_colours_together`] draws several requests faster than one by one.
+    /// Returns true if [`render_colours_together`] is faster than drawing the requests one by one.
     fn draws_together(&self) -> bool {
         false
     }
@@ -74,16 +74,16 @@ enum Wanted {
     Colours,
 }
 
-/// Views of one world that are to be drawn with those of others.
+/// Views of one world, to be drawn together with views of other worlds.
 pub struct RenderRequest<'a> {
     pub renderer: &'a mut dyn Renderer,
     pub step: &'a Step,
     pub cameras: Vec<Camera>,
 }
 
-/// Renders only the colours, as [`Frame::rgb`], of the camera images of several worlds: world by world,
-/// camera by camera. A GPU gets all of them in one submission, and all images are read back at once.
-/// Other renderers draw one after another.
+/// Renders only the colours, in the format of [`Frame::rgb`], of the cameras of several worlds. The result is
+/// ordered by world, then by camera. A GPU draws all images in one submission and reads them back at once;
+/// other renderers draw one after another.
 pub fn render_colours_together(mut requests: Vec<RenderRequest>) -> Vec<Vec<Vec<u8>>> {
     together(&mut requests).unwrap_or_else(|| {
         let each = |RenderRequest { renderer, step, cameras }: RenderRequest| {
@@ -107,22 +107,22 @@ pub struct Frame {
     pub rgb: Vec<u8>,
     /// Distance along the optical axis at the pixel's centre; infinite without a surface.
     pub depth_m: Vec<f32>,
-    /// Id of the visible thing: 0 nothing, 1 the room, then robots, then objects.
+    /// Id of the visible body: 0 for none, 1 for the room, then robots, then objects.
     pub ids: Vec<u32>,
 }
 
-/// Creates the embedded renderer. It draws on the calling thread, and on one more for each further image
-/// of a state.
+/// Creates the embedded renderer. It draws on the calling thread, and on one further thread for each
+/// additional image of a step.
 pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
     Box::new(cpu::CpuRenderer::new(scenery))
 }
 
-/// Creates the path tracer. It draws on all processor cores, and colours alone on the calling thread.
+/// Creates the path tracer. It draws on all processor cores. Colours alone are drawn on the calling thread.
 pub fn path(scenery: Scenery) -> Box<dyn Renderer> {
     Box::new(path::PathRenderer::new(baked::lit(scenery)))
 }
 
-/// Error of encoding an image.
+/// Error while encoding an image.
 pub type PictureError = image::ImageError;
 
 /// Encodes 8-bit RGB, three bytes a pixel, as a PNG file; fast rather than small.
@@ -153,7 +153,7 @@ pub fn encode_grey_png(width: u32, height: u32, grey: &[u8]) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Depth per step of a 16-bit sample.
+/// Depth unit of a 16-bit sample.
 pub const DEPTH_UNIT_M: f64 = 0.001;
 
 /// Encodes depth as a 16-bit PNG file in units of [`DEPTH_UNIT_M`]. A sample is 0 if there is no surface or

@@ -1,11 +1,11 @@
-//! External torques on an arm, observed by the change of the arm's momentum (De Luca et al. 2006,
+//! Observer of external torques on an arm, by the change of the arm's momentum (De Luca et al. 2006,
 //! "Collision detection and safe reaction with the DLR-III lightweight manipulator arm").
 //!
 //! Let joint i have its axis a (unit, world) through o. Let P and L be the linear momentum of everything
 //! beyond it and its moment about o, and p = a . L + armature qd. Then
 //!   p' = tau - tau_gravity + c + tau_ext,   c = (w x a) . L - a . (o' x P),
-//! with w the spin of the link and o' the velocity of o, whatever pelvis and waist do. The observer
-//! follows the part that is known,
+//! with w the angular velocity of the link and o' the velocity of o, for any motion of pelvis and waist. The
+//! observer follows the known part,
 //!   p^' = tau - tau_gravity + c + r,   r = (p - p^) / time,
 //! so that r is tau_ext, low-passed. It needs no acceleration, which joint encoders could not provide.
 //! At rest r is tau_gravity - tau.
@@ -32,8 +32,8 @@ struct JointMomentum {
 }
 
 impl ArmMomentum {
-    /// Runs one physics step, in which the drives of the arm whose first joint is `first` exerted
-    /// `excess_n_m` beyond the torques that hold the arm against gravity. Returns the external torques.
+    /// Runs one physics step. `excess_n_m` are the torques of the drives beyond those that hold the arm
+    /// against gravity; `first` is the arm's first joint. Returns the external torques.
     pub(super) fn update(
         &mut self,
         body: &BodyEstimate,
@@ -44,7 +44,7 @@ impl ArmMomentum {
     ) -> [f32; ARM_JOINTS] {
         let momenta = arm_momenta(body, motions, first);
         let mut followed_n_m_s = self.followed_n_m_s.unwrap_or_else(|| {
-            // Starts as if the present torques had acted for long.
+            // Starts as if the present torques had acted for a long time.
             std::array::from_fn(|i| momenta[i].along_n_m_s + excess_n_m[i] * OBSERVER_TIME_S)
         });
         for (i, followed) in followed_n_m_s.iter_mut().enumerate() {

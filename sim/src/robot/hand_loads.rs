@@ -3,10 +3,10 @@
 //!
 //! Force: external torques tau_ext are J^T f with f the force on the palm, so
 //!   f = (J J^T + damping I)^-1 J tau_ext,   J: 3 x 7 [m],
-//! low-passed. The force of the world uses tau_ext of [`ArmMomentum`], which accounts for the arm's own
-//! motion. The load of an arm on the trunk, its inertia included, uses tau_ext = tau_gravity - tau: the
-//! balance needs both. Damping keeps a stretched arm, which cannot feel along itself, from reporting
-//! nonsense.
+//! low-passed. The external force on a hand uses tau_ext of [`ArmMomentum`], which accounts for the arm's own
+//! motion. The load of an arm on the trunk includes the arm's inertia and uses tau_ext = tau_gravity - tau.
+//! The balance needs both. A stretched arm cannot sense forces along itself; damping keeps its estimate
+//! plausible.
 //!
 //! Weight: at rest the torque beyond gravity is J^T f with f the load at the palm. Only the vertical
 //! part is estimated, as the least squares fit  w = -(J_z . tau) / (J_z . J_z),  low-passed, and never
@@ -24,9 +24,9 @@ use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, HAND_JOINTS, HANDS, JOINTS};
 pub(super) struct HandLoads {
     momentum: Sides<ArmMomentum>,
     payload: Sides<Payload>,
-    /// Force of the world on each hand.
+    /// External force on each hand.
     force: Sides<HandForce>,
-    /// This force with the inertia of the moving arm included.
+    /// External force on each hand plus the inertia of the moving arm.
     reaction: Sides<HandForce>,
     grip: Sides<Grip>,
 }
@@ -39,8 +39,8 @@ struct Arm {
     excess_n_m: [f32; ARM_JOINTS],
 }
 
-/// Filter times: slow compared with the arm's own motion, fast compared with a partner's pull. Where the
-/// observer filters first, both together have the same time.
+/// Filter times: slow compared with the arm's own motion, fast compared with a partner's pull. The external
+/// force first passes the observer's filter, and the two filter times add up to the reaction's.
 const REACTION_FILTER_TIME_S: f32 = 0.2;
 const FORCE_FILTER_TIME_S: f32 = REACTION_FILTER_TIME_S - OBSERVER_TIME_S;
 const FORCE_DAMPING_M2: f32 = 0.002;
@@ -49,13 +49,13 @@ const LARGEST_FORCE_N: f32 = 80.0;
 
 /// Filter time: slow compared with the arm's own motion, fast compared with a lift of one second.
 const WEIGHT_FILTER_TIME_S: f32 = 0.12;
-/// Share of the estimated weight that is fed forward. At 1 two robots that pull on one object would pull
-/// without end.
+/// Share of the estimated weight that is fed forward. With a share of 1, two robots that pull on one object
+/// would never stop pulling.
 const FED_FORWARD_SHARE: f32 = 0.85;
 /// Minimum share of the torques that a weight must explain; an arm that presses sideways shows another
 /// pattern.
 const MIN_EXPLAINED_SHARE: f32 = 0.6;
-/// Maximum weight: Dex3-1 hands are not made for more.
+/// Maximum weight: Dex3-1 hands are not built for heavier loads.
 const LARGEST_WEIGHT_N: f32 = 35.0;
 
 /// Number of thumb joints among the seven joints of a hand.
@@ -96,7 +96,7 @@ impl HandLoads {
         load_n_m
     }
 
-    /// Returns the force of the world on each hand (world frame).
+    /// Returns the external force on each hand (world frame).
     pub(super) fn force_n(&self) -> Sides<Vector> {
         self.force.each_ref().map(HandForce::force_n)
     }
@@ -131,7 +131,7 @@ struct Grip {
 }
 
 impl Grip {
-    /// Runs one physics step; torques of the thumb's joints come first, then those of the fingers'.
+    /// Runs one physics step. Torques of the thumb's joints come first, then those of the finger joints.
     fn update(&mut self, torque_n_m: &[f32], dt_s: f32) {
         for (felt_n_m, torque_n_m) in self.torque_n_m.iter_mut().zip(torque_n_m) {
             *felt_n_m += (torque_n_m - *felt_n_m) * (dt_s / GRIP_FILTER_TIME_S);
@@ -181,7 +181,7 @@ impl HandForce {
         self.force_n
     }
 
-    /// Runs one physics step, in which the palm exerted `outside_n_m` on the joints.
+    /// Runs one physics step, in which the external torques `outside_n_m` acted on the joints.
     fn update(&mut self, fit: &PalmFit, outside_n_m: [f32; ARM_JOINTS], filter_time_s: f32, dt_s: f32) {
         let Some(fitted_n) = fit.force_n(outside_n_m) else { return };
         let measured_n = fitted_n.clamp_length_max(LARGEST_FORCE_N);
@@ -260,7 +260,7 @@ mod tests {
         let (feeling, load_n_m) = feel(&body, force_n);
         let found_n = feeling.weight_n();
         assert!((found_n.right - weight_n).abs() < 1e-2 && found_n.left.abs() < 1e-3, "{found_n:?}");
-        // Most of it is fed forward, on top of gravity.
+        // Most of the weight is fed forward, on top of gravity.
         let gravity_n_m = body.gravity_torques_n_m();
         for joint in 0..JOINTS {
             let held = (ARMS.right..ARMS.right + ARM_JOINTS).contains(&joint);

@@ -3,7 +3,7 @@
 use crate::body::{JOINTS, JointDrive, RobotModel};
 use crate::dynamics::{Drive, Tree};
 
-/// Returns coordinates (rad) and velocities (rad/s).
+/// Returns the joints' coordinates (rad) and velocities (rad/s).
 pub(super) fn read(tree: &Tree, model: &RobotModel) -> ([f32; JOINTS], [f32; JOINTS]) {
     let of = |value: fn(&Tree, usize) -> f64| {
         std::array::from_fn(|joint| of_joint(model, joint, |link| value(tree, link)))

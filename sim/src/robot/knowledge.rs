@@ -1,5 +1,5 @@
-//! A robot's knowledge of its own body: by its sensors and an estimator, or, for comparison, by the
-//! simulator's own state.
+//! A robot's estimate of its own body: by its sensors and an estimator, or, for comparison, from the
+//! simulator's state.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::mechanism::rounded;
 use crate::plane::{flat, heading_rad};
 use crate::{PHYSICS_DT_S, Sides};
 
-/// Source of a robot's knowledge of its pelvis.
+/// Source of the state estimate of a robot's pelvis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StateSource {
@@ -44,7 +44,7 @@ impl StateSource {
 }
 
 impl Sensing {
-    /// Knowledge of robots before the estimator existed: the simulator's own state.
+    /// Configuration from before the estimator existed: the simulator's state and ideal sensors.
     pub const TRUTH: Sensing = Sensing { state_estimate: StateSource::Truth, sensors: SensorModel::Ideal };
 }
 
@@ -55,13 +55,14 @@ pub(super) struct SelfKnowledge {
     readings: SensorReadings,
     /// The estimator; `None` if truth is the source.
     estimator: Option<StateEstimator>,
-    /// Frame on the floor under the pelvis at the start, z up, x where the pelvis faced.
+    /// Start frame: on the floor under the initial position of the pelvis, z up, x in the direction that the
+    /// pelvis faced.
     world_from_start: Pose,
 }
 
 impl SelfKnowledge {
-    /// Creates the knowledge of a robot that has stood still for a second. It takes place and heading of
-    /// its pelvis from `told`. Equal seeds give equal noise.
+    /// Creates the estimate of a robot that has stood still for a second. The initial position and heading of
+    /// the pelvis are those of `told`. Equal seeds give equal noise.
     pub(super) fn new(
         model: &RobotModel,
         tree: &Tree,
@@ -110,8 +111,8 @@ impl SelfKnowledge {
     }
 }
 
-/// Returns the body by the simulator's state, with ideal sensors to the last bit. Masses are the
-/// model's, regardless of loads on a hand.
+/// Returns the body estimate from the simulator's state. With ideal sensors the two are bit-identical. Masses
+/// are the model's, regardless of loads on a hand.
 fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -> BodyEstimate {
     let mut com_m = Vector::ZERO;
     let mut com_velocity_m_s = Vector::ZERO;
@@ -155,8 +156,8 @@ mod tests {
     use crate::body::posed::{Posed, model};
     use crate::dynamics::{DVec3, Dynamics, Settings};
 
-    /// The values read from the physics world are those of the model's kinematics for joints and pelvis. The
-    /// robot is in the air without contacts, with a moving arm.
+    /// The values read from the physics world match the model's kinematics for joints and pelvis. The robot
+    /// is in the air without contacts, with a moving arm.
     #[test]
     fn poses_and_velocities_are_those_of_the_model() {
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));

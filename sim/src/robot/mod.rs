@@ -47,7 +47,7 @@ pub struct Robot {
     memory: RobotMemory,
     /// The robot's estimate of its body since the last [`Robot::sense`].
     body: BodyEstimate,
-    /// Setpoints of the motors for the next control step, in place of its command; empty without them.
+    /// Motor setpoints for the next control step, in place of its command; empty if the command applies.
     setpoints: Vec<MotorSetpoints>,
     /// Sensor readings of the last control step, one for each physics step.
     readings: Vec<SensorReadings>,
@@ -64,7 +64,7 @@ struct RobotMemory {
     fallen: bool,
 }
 
-/// Rate of change of a target below which an arm or finger counts as commanded to be still.
+/// Rate of change of a target up to which an arm or finger counts as commanded to be still.
 const STILL_TOLD_RAD_S: f32 = 0.2;
 const FALLEN_HEIGHT_M: f64 = 0.4;
 const FALLEN_TILT_COSINE: f64 = 0.5;
@@ -84,8 +84,8 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
-    /// Replaces the sensors and all knowledge that they gave. The robot is assumed to have stood still until
-    /// now, at the pose `told`.
+    /// Replaces the sensors and the state estimate. The robot is assumed to have stood still until now, at
+    /// the pelvis pose `told`.
     pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, told: &Pose, sensing: Sensing, seed: u64) {
         let tree = dynamics.tree(self.tree);
         self.memory.knowledge = SelfKnowledge::new(&self.model, tree, told, sensing, seed);
@@ -93,21 +93,21 @@ impl Robot {
         self.recollect(dynamics);
     }
 
-    /// Replaces drives and base controller by setpoints of the motors for the next control step: one for
-    /// each physics step, or one for all of them.
+    /// Replaces drives and base controller by motor setpoints for the next control step: one for each physics
+    /// step, or one for all of them.
     pub(crate) fn set_motors(&mut self, setpoints: &[MotorSetpoints]) {
         let valid = [1, PHYSICS_STEPS_PER_CONTROL as usize].contains(&setpoints.len());
         assert!(valid, "one setpoint for a control step, or one for each physics step");
         self.setpoints = setpoints.to_vec();
     }
 
-    /// Ends a control step, whose setpoints apply no longer.
+    /// Ends a control step and discards its setpoints.
     pub(crate) fn end_step(&mut self) {
         self.setpoints.clear();
     }
 
-    /// Returns the sensor readings of the last control step in order of time, one for each physics step;
-    /// at the start and after a restore the last one alone.
+    /// Returns the sensor readings of the last control step in order of time, one for each physics step. At
+    /// the start and after a restore it returns only the last reading.
     pub fn readings(&self) -> &[SensorReadings] {
         match self.readings.is_empty() {
             true => std::slice::from_ref(self.memory.knowledge.readings()),
@@ -121,15 +121,15 @@ impl Robot {
         let body = self.memory.knowledge.update(&self.model, tree);
         self.readings.push(self.memory.knowledge.readings().clone());
         self.take(body);
-        // This uses the simulator's state rather than the robot's estimate: it is scored, and switches
-        // off the legs.
+        // Falls are detected from the simulator's state rather than the robot's estimate: they are scored,
+        // and switch off the legs.
         let pelvis = tree.world_from_link(0);
         let upright = (pelvis.rotation * DVec3::Z).z;
         self.memory.fallen |= pelvis.translation.z < self.model.scale.precise_height_m(FALLEN_HEIGHT_M)
             || upright < FALLEN_TILT_COSINE;
     }
 
-    /// Restores the body estimate from the time when this robot's memory was made.
+    /// Restores the body estimate that belongs to the robot's restored memory.
     fn recollect(&mut self, dynamics: &Dynamics) {
         let body = self.memory.knowledge.body(&self.model, dynamics.tree(self.tree));
         self.take(body);
@@ -242,9 +242,9 @@ impl Robot {
     }
 }
 
-/// Returns the drives of the legs of a robot that has fallen. No controller here gets up, and one that
-/// goes on balancing on its back thrashes about with kilowatts. The dampers of the drives let it sink.
-/// Waist, arms and hands still follow their commands.
+/// Returns the leg drives of a robot that has fallen. No controller here gets up, and a controller that
+/// continues to balance a robot on its back makes it thrash with kilowatts. The dampers of the drives let the
+/// robot sink. Waist, arms and hands still follow their commands.
 fn limp_legs(model: &RobotModel) -> LegCommand {
     LEGS.map(|first| {
         std::array::from_fn(|i| JointDrive {

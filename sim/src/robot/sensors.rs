@@ -1,5 +1,5 @@
-//! Readings of a robot's sensors: ideal ones report the simulator's own state, those of a G1 add noise,
-//! bias and latency.
+//! Readings of a robot's sensors. Ideal sensors report the simulator's state; those of a G1 add noise, bias
+//! and latency.
 
 use rapier3d::math::{Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use crate::random::SplitMix64;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorModel {
-    /// Every reading is exact and of this instant.
+    /// Exact readings without latency.
     #[default]
     Ideal,
     /// Noise, bias and latency of a Unitree G1.
@@ -27,7 +27,7 @@ pub enum SensorModel {
 }
 
 impl SensorModel {
-    /// Models available in settings; the others are applied to episodes as stress.
+    /// Models available in settings. The others are only applied to episodes as stress.
     pub const ALL: [SensorModel; 2] = [SensorModel::Ideal, SensorModel::G1];
 
     pub fn name(self) -> &'static str {
@@ -124,7 +124,7 @@ impl Sensors {
         }
     }
 
-    /// Draws a vector, each part with a standard deviation of 1.
+    /// Draws a vector whose components each have a standard deviation of 1.
     fn normal(&mut self) -> Vector {
         let mut draw = || self.random.normal();
         Vector::new(draw(), draw(), draw())
@@ -156,7 +156,7 @@ impl Sensors {
         read
     }
 
-    /// Returns the age of readings when they arrive.
+    /// Returns the age of readings when the robot receives them.
     pub(super) fn latency_s(&self) -> f32 {
         self.noise().map_or(0.0, |noise| noise.latency_s)
     }
@@ -184,7 +184,7 @@ impl Sensors {
     }
 }
 
-/// Returns the readings `share` of a step before `now`, where `before` was a step ago.
+/// Interpolates the readings at a share of a step before `now`; `before` is one step before `now`.
 fn between(now: &SensorReadings, before: &SensorReadings, share: f32) -> SensorReadings {
     let mix = |now: &[f32; JOINTS], before: &[f32; JOINTS]| {
         std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * share)
@@ -251,7 +251,7 @@ mod tests {
         assert!((ideal.specific_force_m_s2 - Vector::Z * GRAVITY_M_S2).length() < 1e-4);
     }
 
-    /// The mean of many readings of one robot is off by its own bias, which its seed draws.
+    /// The mean of many readings of one robot is off by a constant bias, which depends on the seed.
     #[test]
     fn biases_stay() {
         const READINGS: usize = 100;
@@ -277,8 +277,8 @@ mod tests {
         check(&forces_m_s2, G1.acc_bias_m_s2, G1.acc_m_s2);
     }
 
-    /// A robot that begins to fall measures no force at once; with noisy sensors it still measures most
-    /// of its weight.
+    /// A robot that begins to fall immediately measures zero force with ideal sensors. With noisy sensors,
+    /// which have latency, it still measures most of its weight.
     #[test]
     fn readings_are_late() {
         let upwards = |sensors: SensorModel| {

@@ -83,7 +83,7 @@ fn standing_pelvis(model: &RobotModel, placement: &RobotPlacement, q_rad: &[f32]
     at(-lowest_m)
 }
 
-/// Returns a link of the model with the joint that carries it; the first is free.
+/// Returns a link of the model with the joint that carries it. The first link is free.
 fn tree_link(model: &RobotModel, link: &body::LinkModel) -> Link {
     let joint = link.joint.map_or(Joint::Free, |joint| {
         let joint = &model.joints[joint];

@@ -1,5 +1,4 @@
-//! Knowledge of a robot, by access: the values that it senses, its estimate of its place in the world,
-//! and the truth of the simulator.
+//! State of a robot: sensor readings, the robot's estimate of its pose in the world, and ground truth.
 
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
@@ -19,8 +18,8 @@ pub struct RobotSensed {
     pub joints: JointReadings,
     /// Direction of gravity, which the IMU measures, in the pelvis frame.
     pub gravity_in_pelvis: Vector,
-    /// The pelvis by the robot's own odometry. The start frame is on the floor under the initial
-    /// position of the pelvis, z up, x where the pelvis faced.
+    /// Pose of the pelvis by the robot's own odometry. The start frame is on the floor under the initial
+    /// position of the pelvis, z up, x in the direction that the pelvis faced.
     pub start_from_pelvis: Pose,
     pub pelvis_from_wrist: Sides<Pose>,
     /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
@@ -31,8 +30,8 @@ pub struct RobotSensed {
     pub is_stepping: Option<bool>,
 }
 
-/// A robot's estimate of its own place, which steers its hands and its base: by its estimator, in a
-/// frame that was the world's at the start. No reply shows it.
+/// A robot's own estimate of its pose, by which its hands and base are controlled. The frame was the world
+/// frame at the start. No reply contains this estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotEstimate {
     pub world_from_pelvis: Pose,
@@ -40,7 +39,8 @@ pub struct RobotEstimate {
     pub hand_force_n: Sides<Vector>,
 }
 
-/// State of a robot that only the simulator knows: for scoring, recordings, images and experts.
+/// State of a robot in the simulator, to which the robot has no access: for scoring, recordings, images and
+/// experts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotTruth {
     /// Pose of every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.
@@ -48,18 +48,18 @@ pub struct RobotTruth {
     pub world_from_wrist: Sides<Pose>,
     /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub world_from_camera: Pose,
-    /// Pose of the camera one control step earlier; `None` before the first step and where it is not known.
+    /// Pose of the camera one control step earlier; `None` before the first step and if it is unknown.
     /// Recordings leave it out, since the step before has it.
     #[serde(skip)]
     pub world_from_camera_before: Option<Pose>,
-    /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true: nothing puts a
-    /// robot back. It is the only field here that affects a robot and its policy: the legs lose power,
-    /// and replies report it.
+    /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true, since no robot is put
+    /// back on its feet. No other field here affects a robot and its policy: the legs lose power, and replies
+    /// report the fall.
     pub fallen: bool,
 }
 
 impl RobotSensed {
-    /// Returns the mechanical power of all joints; each counts with its absolute value.
+    /// Returns the sum of the absolute mechanical powers of all joints.
     pub fn power_w(&self) -> f32 {
         let JointReadings { qd_rad_s, torque_n_m, .. } = &self.joints;
         torque_n_m.iter().zip(qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
@@ -99,7 +99,7 @@ impl Robot {
         }
     }
 
-    /// Returns the robot's estimate of its own place.
+    /// Returns the robot's estimate of its own pose.
     pub(crate) fn estimate(&self) -> RobotEstimate {
         RobotEstimate {
             world_from_pelvis: self.body.world_from_pelvis(),
@@ -125,7 +125,7 @@ impl Robot {
         }
     }
 
-    /// Returns the pose of the camera as [`RobotTruth`] has it.
+    /// Returns the pose of the camera as in [`RobotTruth`].
     pub(crate) fn world_from_camera(&self, dynamics: &Dynamics) -> Pose {
         let model = &self.model;
         let world_from_head = dynamics.tree(self.tree).world_from_link(model.egocentric_link);

@@ -80,8 +80,8 @@ impl World {
         })
     }
 
-    /// Returns the points that pressed in the last step: the owners of their colliders, and the normal
-    /// force on the second (N, world).
+    /// Returns the contact points with a force in the last step: the owners of both colliders, and the normal
+    /// force on the second collider (N, world).
     fn presses(&self) -> impl Iterator<Item = ([Option<Owner>; 2], Vector)> {
         let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
         self.dynamics.touches().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {

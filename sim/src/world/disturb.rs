@@ -1,5 +1,5 @@
-//! Disturbances that no command can make: pushes at a link, weights fused to a hand, objects moved
-//! elsewhere. They serve benches, tests of controllers and stress on episodes; no tool reaches them.
+//! Disturbances that no command can cause: pushes on a link, weights fixed to a hand, objects moved
+//! elsewhere. They serve benchmarks, tests of controllers and stress on episodes; no tool exposes them.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub struct PlannedPush {
     pub point_in_link_m: Vector,
     /// Force in the world frame.
     pub force_n: Vector,
-    /// The world's control steps, counted from 0, in which it acts.
+    /// Control steps of the world, counted from 0, in which the push acts.
     pub control_steps: Range<u64>,
 }
 
@@ -77,7 +77,8 @@ impl World {
         self.planned_pushes = planned.into_iter().map(push).collect();
     }
 
-    /// Multiplies the mass of an object and of all its moving parts by `factor`. It is part of the set-up.
+    /// Multiplies the mass of an object and of all its moving parts by `factor`. The change is part of the
+    /// set-up, not of the state.
     pub fn scale_mass(&mut self, object: &str, factor: f64) {
         for index in self.parts_of(object) {
             let Some(link) = self.objects[index].link else { continue };
@@ -88,7 +89,8 @@ impl World {
         }
     }
 
-    /// Scales an object and all its moving parts to this total mass. It is part of the set-up.
+    /// Scales an object and all its moving parts to this total mass. The change is part of the set-up, not of
+    /// the state.
     pub fn set_mass(&mut self, object: &str, mass_kg: f64) {
         let link_kg = |index: usize| {
             let link = self.objects[index].link?;
@@ -98,7 +100,8 @@ impl World {
         self.scale_mass(object, mass_kg / now_kg);
     }
 
-    /// Reduces the friction of an object and of all its moving parts to this share. It is part of the set-up.
+    /// Reduces the friction of an object and of all its moving parts to this share. The change is part of the
+    /// set-up, not of the state.
     pub fn leave_friction(&mut self, object: &str, share: f64) {
         for index in self.parts_of(object) {
             self.dynamics.leave_friction(Owner::Object(index).tag(), share);
@@ -133,7 +136,7 @@ impl World {
         self.pushes.push(Push { link, point_in_link_m, force_n });
     }
 
-    /// Sets a hinge of an object, by its name in the file.
+    /// Sets position and velocity of an object's hinge, by the joint's name in the file.
     ///
     /// # Panics
     ///
@@ -224,7 +227,7 @@ mod tests {
         vec![world.rest_command(0)]
     }
 
-    /// Returns the loss of speed in a fifth of a second of a crate that slides at 2 m/s.
+    /// Returns the speed that a crate sliding at 2 m/s loses in a fifth of a second.
     fn slowed_m_s(mut world: World) -> f64 {
         let commands = rest(&world);
         for _ in 0..10 {

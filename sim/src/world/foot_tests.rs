@@ -1,4 +1,4 @@
-//! Feet against things on the floor: toes do not pass through table legs, bottles and other feet.
+//! Tests of feet against obstacles on the floor: toes do not pass through table legs, bottles and other feet.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;

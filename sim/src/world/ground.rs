@@ -1,4 +1,4 @@
-//! The ground under a room whose own floor ends.
+//! The ground under a room whose own floor is bounded.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -9,7 +9,7 @@ use crate::mjcf::{Geom, Gloss, Primitive};
 
 /// Cosine of the maximum tilt of a plane that carries fallen objects.
 const CARRIES_COSINE: f64 = 0.5;
-/// MJCF's defaults.
+/// Default friction of MJCF.
 const PLAIN: Friction = Friction {
     directions: Directions::Slide,
     slide: 1.0,
@@ -20,9 +20,10 @@ const PLAIN: Friction = Friction {
 };
 
 impl World {
-    /// Puts an endless plane under the lowest shape of the scene, unless the scene already has such a plane.
-    /// Exported rooms have boxes for floors, and an object that goes over the edge would fall forever. In a
-    /// scene without colliders the plane is at z = 0, where robots are put. It is not drawn.
+    /// Puts an endless plane under the lowest shape of the scene, unless the scene already has an endless
+    /// floor. Exported rooms have boxes for floors, and an object that slides over the edge would fall
+    /// forever. In a scene without colliders the plane is at z = 0, where robots are put. The plane is not
+    /// drawn.
     pub(super) fn lay_ground(&mut self) {
         // No joint moves a plane.
         let carries = |(collider, at): (&Collider, DPose3)| {

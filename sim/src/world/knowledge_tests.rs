@@ -1,4 +1,4 @@
-//! Only sensed values reach a robot's controller, its hands' frames and its replies.
+//! Tests that only sensed values reach a robot's controller, its hands' frames and its replies.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -11,7 +11,7 @@ use crate::robot::{RobotCommand, RobotPlacement, Sensing, SensorModel, StateSour
 const PLACE_M: [f32; 2] = [40.0, -30.0];
 const YAW_RAD: f32 = 1.6;
 
-/// Creates a robot at a place whose estimate starts at the origin, looking along x.
+/// Creates a world with a robot at this place. Its estimate starts at the origin instead, looking along x.
 fn misled(position_m: [f32; 2], yaw_rad: f32, sensing: Sensing) -> World {
     let robot = RobotPlacement { name: "A".into(), position_m, yaw_rad };
     let mut world =
@@ -22,7 +22,7 @@ fn misled(position_m: [f32; 2], yaw_rad: f32, sensing: Sensing) -> World {
     world
 }
 
-/// Walks a curve with an arm on the move and a small pull backwards on one hand. Returns the steps.
+/// Walks a curve with a moving arm and a small backward pull on one hand. Returns the steps.
 fn walk(world: &mut World) -> Vec<RobotStep> {
     let rest = world.rest_command(0);
     let base = BaseCommand { vx_m_s: 0.3, yaw_rate_rad_s: 0.2, ..rest.base };
@@ -42,9 +42,9 @@ fn apart(a: &Pose, b: &Pose) -> f32 {
     (a.translation - b.translation).length() + 2.0 * (a.rotation.inverse() * b.rotation).xyz().length()
 }
 
-/// Place and heading of a world have no effect on a robot's actions, estimates and replies. Two robots
-/// with the same initial estimate act alike, 50 m apart and with another heading. The remaining
-/// difference is rounding that grows on two legs.
+/// Position and heading in the world have no effect on a robot's actions, estimates and replies. Two robots
+/// with the same initial estimate act alike, 50 m apart and with different headings. The remaining difference
+/// is rounding that grows on two legs.
 #[test]
 fn where_the_world_is_reaches_no_robot() {
     for sensors in SensorModel::ALL {
@@ -63,7 +63,7 @@ fn where_the_world_is_reaches_no_robot() {
             Pose::from_parts(Vector::new(PLACE_M[0], PLACE_M[1], 0.0), Rotation::from_rotation_z(YAW_RAD));
         let walked_m = last.sensed.start_from_pelvis.translation.truncate().length();
         assert!(walked_m > 0.2, "{walked_m}");
-        // Its error is exactly the wrong initial estimate.
+        // The error of the estimate is exactly that of the initial estimate.
         assert!(
             apart(&(world_from_told * there.estimate.world_from_pelvis), &there.truth.world_from_pelvis())
                 < 0.05
@@ -71,7 +71,7 @@ fn where_the_world_is_reaches_no_robot() {
     }
 }
 
-/// With the simulator's own state, the same robot knows its true place, for any initial estimate.
+/// With the simulator's state as source, the robot's estimate is its true pose, for any initial estimate.
 #[test]
 fn the_simulators_state_is_not_misled() {
     let mut world = misled(PLACE_M, YAW_RAD, Sensing::TRUTH);

@@ -16,7 +16,7 @@ pub struct SceneLights {
 /// A light with its carrier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarriedLight {
-    /// Index of the object that carries it; `None` in the room.
+    /// Index of the object that carries it; `None` for a light fixed in the room.
     pub object: Option<usize>,
     /// The light in the frame of the object, or of the world.
     pub light: FileLight,

@@ -53,7 +53,7 @@ pub struct WorldSpec {
 pub enum SceneSource {
     /// A scene embedded in the binary, by name.
     Embedded(String),
-    /// A scene that was read, and the pose of its origin.
+    /// A parsed scene, and the pose of its origin.
     Read { document: Arc<Document>, world_from_scene: Pose },
 }
 
@@ -97,7 +97,7 @@ pub struct World {
 }
 
 impl World {
-    /// Builds the world at rest, with embedded robots; no step has been made yet.
+    /// Builds the world at rest, before its first step, with the embedded robot model.
     ///
     /// # Errors
     ///
@@ -134,7 +134,7 @@ impl World {
     }
 
     /// Builds a scene with only the content of its own file. The scene begins in its key `start`. Its
-    /// actuators follow that key's controls, and from the time of every later key that key's controls.
+    /// actuators follow the controls of that key, and the controls of each later key from that key's time on.
     ///
     /// # Errors
     ///
@@ -143,8 +143,8 @@ impl World {
         World::furnished(&scene, &Pose::IDENTITY, true)
     }
 
-    /// Builds the world like [`World::of_scene`], with the scene's own origin at `world_from_scene`. Its free
-    /// bodies sleep while they rest far from all other bodies, if they may.
+    /// Builds the world like [`World::of_scene`], with the scene's own origin at `world_from_scene`. If
+    /// `may_sleep` is true, free bodies sleep while they rest far from all other bodies.
     fn furnished(scene: &Document, world_from_scene: &Pose, may_sleep: bool) -> Result<World, SimError> {
         let gravity_m_s2 = gravity_m_s2(scene, world_from_scene);
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
@@ -176,12 +176,12 @@ impl World {
     ///
     /// # Panics
     ///
-    /// Panics if the number of commands is not that of the robots.
+    /// Panics if the number of commands differs from the number of robots.
     pub fn control_step(&mut self, commands: &[RobotCommand]) -> Result<Step, Diverged> {
         self.step_by(commands, World::advance)
     }
 
-    /// Runs one control step whose physics steps `advance` makes.
+    /// Runs one control step, in which `advance` makes each physics step.
     fn step_by(
         &mut self,
         commands: &[RobotCommand],
@@ -202,20 +202,19 @@ impl World {
     }
 
     /// Drives every joint of a robot by `setpoints` in the next control step: one for each physics step, or
-    /// one for all of them. The robot's command is then only recorded. The base controller lets go, no
+    /// one for all of them. The robot's command is then only recorded. The base controller is reset, no
     /// torque is added against gravity, and a fallen robot is driven, too.
     ///
     /// # Panics
     ///
-    /// Panics if there is no such robot, or the number of setpoints is neither 1 nor that of the physics
-    /// steps.
+    /// Panics if there is no such robot, or if the number of setpoints is neither 1 nor the number of physics
+    /// steps in a control step.
     pub fn drive_motors(&mut self, robot: usize, setpoints: &[MotorSetpoints]) {
         self.robots[robot].set_motors(setpoints);
     }
 
-    /// Sets the drives and forces on the robots and the scene's joints for physics step `substep` of a control
-    /// step. This, [`World::advance`] and [`World::sense`] are the parts of [`World::control_step`] that are
-    /// repeated.
+    /// Sets the drives and forces on the robots and the scene's joints for physics step `substep` of a
+    /// control step. A [`World::control_step`] repeats this, [`World::advance`] and [`World::sense`].
     pub fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
         for (robot, command) in self.robots.iter_mut().zip(commands) {
             robot.drive(&mut self.dynamics, command, substep);
@@ -240,8 +239,8 @@ impl World {
         self.robots.iter_mut().for_each(|robot| robot.sense(&self.dynamics));
     }
 
-    /// Gives all robots other sensors, whose noise `seed` decides, and another state estimate. The
-    /// estimate assumes that they have stood still until now.
+    /// Replaces the sensors of all robots, whose noise `seed` determines, and their state estimates. The
+    /// estimates assume that the robots have stood still until now.
     pub fn set_sensing(&mut self, sensing: Sensing, seed: u32) {
         for (index, robot) in self.robots.iter_mut().enumerate() {
             let told = robot.truth(&self.dynamics).world_from_pelvis();
@@ -273,13 +272,13 @@ impl World {
         self.lights.as_ref()
     }
 
-    /// Returns the image of the sky in the scene's file, or the six of a cube around the camera.
+    /// Returns the sky of the scene's file: a single image, or the six of a cube around the camera.
     pub fn sky(&self) -> Option<&Arc<Texture>> {
         self.sky.as_ref()
     }
 
-    /// Returns the position of a hinge (rad) or a slide (m) of an object, by its name in the file; the
-    /// first one of that name. Returns `None` if there is none.
+    /// Returns the position of an object's hinge (rad) or slide (m), by the joint's name in the file. The
+    /// first joint of that name counts. Returns `None` if there is none.
     pub fn joint_position(&self, joint: &str) -> Option<f64> {
         let link = self.link_of(|object| object.joint.as_deref() == Some(joint))?;
         Some(self.dynamics.tree(link.tree).joint_position(link.link))

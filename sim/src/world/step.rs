@@ -25,7 +25,7 @@ pub struct Step {
     pub body_touches: Vec<BodyTouch>,
 }
 
-/// One robot: sensed values after the step, its estimate of its place, the truth, and the step's command.
+/// One robot: sensed values after the step, its estimate of its pose, the truth, and the step's command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
     pub sensed: RobotSensed,
@@ -35,14 +35,14 @@ pub struct RobotStep {
     pub command: RobotCommand,
 }
 
-/// One object.
+/// Name and state of one object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObjectStep {
     pub name: String,
     pub state: ObjectState,
 }
 
-/// One hand on one object.
+/// Contact of one hand with one object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Touch {
     /// Index into [`Step::robots`].
@@ -53,7 +53,7 @@ pub struct Touch {
     pub contacts: HandContacts,
 }
 
-/// One robot on one object, with any part.
+/// Contact of any part of a robot with one object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct BodyTouch {
     /// Index into [`Step::objects`].
@@ -85,7 +85,7 @@ impl Step {
         self.objects.iter().find(|object| object.name == name).map(|object| &object.state)
     }
 
-    /// Returns true if any part of any robot touches an object; false for an unknown one.
+    /// Returns true if any part of any robot touches an object; false for an unknown object.
     pub fn is_touched(&self, object: &str) -> bool {
         self.body_touches.iter().any(|touch| self.objects[touch.object].name == object)
     }

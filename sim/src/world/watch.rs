@@ -50,12 +50,12 @@ pub struct Extremes {
     pub joint_speed_share: Greatest,
 }
 
-/// Watcher of a world, physics step by physics step.
+/// Monitor of a world, called for every physics step.
 #[derive(Default)]
 pub struct Watch {
     pub extremes: Extremes,
     window: VecDeque<EnergyBalance>,
-    /// Pairs that overlap by too much, and the number of physics steps since the start.
+    /// Pairs that overlap by more than [`DEEP_M`], and the number of physics steps since they began to.
     deep: BTreeMap<[ColliderId; 2], u32>,
 }
 
@@ -83,14 +83,14 @@ impl Greatest {
         }
     }
 
-    /// Keeps the greater of both.
+    /// Keeps the greater of the two values.
     pub fn join(&mut self, other: &Greatest, at: impl FnOnce(&str) -> String) {
         self.see(other.value, || at(&other.at));
     }
 }
 
 impl Extremes {
-    /// Takes over the values that are greater in `other`; `at` gives their place.
+    /// Keeps the greater value of each quantity; `at` converts the places in `other`.
     pub fn join(&mut self, other: &Extremes, at: impl Fn(&str) -> String) {
         let pairs = [
             (&mut self.speed_m_s, &other.speed_m_s),

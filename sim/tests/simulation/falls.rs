@@ -68,7 +68,7 @@ fn floors_go_on_where_they_are_no_longer_drawn() {
     assert!(bottle_m.z.abs() < 0.05, "{bottle_m}");
 }
 
-/// A scene without colliders has a ground all the same, where robots stand.
+/// A scene without colliders has a ground nevertheless, on which robots stand.
 #[test]
 fn robots_stand_in_a_scene_of_nothing() {
     let ghost = r#"<geom type="box" size="1 1 1" pos="4 0 -5" contype="0" conaffinity="0"/>"#;

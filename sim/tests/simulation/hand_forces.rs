@@ -1,11 +1,12 @@
-//! Hand forces while arms move: only the force of the world, without the arms' own inertia.
+//! Hand forces while arms move: only external forces are reported, without the inertia of the arms.
 
 use tandem_sim::{
     ARM_COLUMNS, CONTROL_DT_S, RobotCommand, RobotPlacement, RobotStep, Sensing, SensorModel, Side, Vector,
     World, WorldSpec,
 };
 
-/// Hands a forearm's length ahead of the chest, and true for joints that a right arm mirrors.
+/// Joint positions with the hands a forearm's length ahead of the chest; true for joints mirrored on the
+/// right arm.
 const FORWARD: [(f32, bool); 7] =
     [(-0.35, false), (0.3, true), (0.0, true), (0.3, false), (0.0, true), (0.0, false), (0.0, true)];
 const RAISED_S: f32 = 2.0;
@@ -41,7 +42,7 @@ fn waves(sensors: SensorModel, pull_n: Vector, pulled_s: f32, mut look: impl FnM
     }
 }
 
-/// Empty hands feel almost no force while the arms swing.
+/// Almost no force is reported at empty hands while the arms swing.
 #[test]
 fn hands_that_wave_feel_little() {
     for (sensors, most_n, mean_n) in [(SensorModel::Ideal, 2.0, 0.8), (SensorModel::G1, 3.0, 1.0)] {
@@ -62,7 +63,7 @@ fn hands_that_wave_feel_little() {
     }
 }
 
-/// A pull is felt while the arms wave, most of it within 0.3 s.
+/// A pull is reported while the arms wave, most of it within 0.3 s.
 #[test]
 fn a_pull_is_felt_while_the_arms_wave() {
     let (pull_n, pulled_s) = (Vector::new(0.0, 0.0, -12.0), 4.0);

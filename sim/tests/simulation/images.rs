@@ -105,7 +105,7 @@ fn an_image_along_z_has_its_top_at_the_far_side_and_repeats_as_asked() {
     for kind in [RendererKind::Cpu, RendererKind::Path] {
         let once = drawn(kind, &(asset(r#"type="2d""#, "") + floor), &above);
         assert_eq!(names(&once, QUARTERS), UPRIGHT);
-        // Twice over a plane of 2 m: a whole one in the middle, and halves around it.
+        // The image repeats twice over a plane of 2 m: a whole image in the middle, and halves around it.
         let twice = drawn(kind, &(asset(r#"type="2d""#, r#"texrepeat="2 2""#) + floor), &above);
         assert_eq!(names(&twice, [[40, 40], [56, 40], [40, 56], [56, 56]]), UPRIGHT);
         assert_eq!(names(&twice, [[8, 8], [88, 8], [8, 88], [88, 88]]), ["grey", "blue", "green", "red"]);
@@ -192,7 +192,8 @@ fn each_face_of_a_cube_may_have_an_image_of_its_own() {
     }
 }
 
-/// Own rooms ask for tiles of half a metre by their material's pattern; a checker is as large as its file says.
+/// The pattern `tiles` of a material gives tiles of half a metre; without it, a checker repeats as its file
+/// specifies.
 #[test]
 fn builtin_textures_repeat_as_images_do() {
     let above = looking(Vector::new(0.0, 0.0, 1.5), Vector::ZERO);
@@ -215,6 +216,6 @@ fn builtin_textures_repeat_as_images_do() {
     let nine = r#"texrepeat="9 9""#;
     assert_eq!(tiled(nine).rgb, tiled("").rgb);
     assert_ne!(tiled(nine).rgb, drawn(RendererKind::Cpu, &(asset(nine) + floor), &above).rgb);
-    // At 0.12 m from the middle is a tile's corner, and at 0.6 m the next tile.
+    // A tile's corner is at the middle; 0.12 m from it are the tiles around it, and at 0.6 m the next tile.
     assert_eq!(names(&tiled(""), [[40, 40], [56, 40], [8, 40], [88, 40]]), ["red", "blue", "blue", "red"]);
 }

@@ -1,4 +1,4 @@
-//! Worlds from outside: physics and images.
+//! Tests of worlds through the public interface: physics and images.
 
 mod allocation;
 mod falls;

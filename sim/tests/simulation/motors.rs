@@ -77,7 +77,7 @@ fn holding(q_rad: [f32; JOINTS]) -> MotorSetpoints {
     MotorSetpoints { q_rad, kp_n_m_rad, kd_n_m_s_rad, ..MotorSetpoints::LIMP }
 }
 
-/// Makes control steps under setpoints; returns whether the robot has fallen.
+/// Runs control steps with setpoints. Returns true if the robot has fallen.
 fn driven(world: &mut World, setpoints: &[MotorSetpoints], control_steps: u32) -> bool {
     let command = world.rest_command(0);
     let mut fallen = false;

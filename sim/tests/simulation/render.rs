@@ -386,7 +386,7 @@ fn pictures_do_not_depend_on_who_else_draws() {
     let steps = [0.2, 0.4].map(|x_m| step(&[at(x_m, 0.5, 0.1)]));
     let mut first: Vec<Frame> = Vec::new();
     for round in 0..6 {
-        // Another one draws before each, as often as there are others.
+        // Another renderer draws before each image, as often as there are other renderers.
         for turn in 0..heights_m.len() {
             let number = turn * (1 + round % 4) % heights_m.len();
             let frames = steps.each_ref().map(|step| renderers[number].render(step, &camera));

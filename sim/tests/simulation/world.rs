@@ -83,7 +83,7 @@ fn robots_stand_while_their_arms_move() {
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
 }
 
-/// A robot is its file: one with a torso of 10 kg stands and waves without any code.
+/// A robot is defined by its file: one with a torso of 10 kg stands and waves without any other code.
 #[test]
 fn another_robots_file_is_all_it_takes() {
     let ours = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");
@@ -148,7 +148,7 @@ fn a_step_says_what_was_done_and_comes_back_from_its_bytes() {
     assert_eq!(postcard::from_bytes::<Step>(&bytes).expect("it was just written"), alone(step));
 }
 
-/// Returns a step without the poses of the step before, which neither its bytes nor snapshots have.
+/// Returns a step without the poses of the previous step, which neither its bytes nor snapshots contain.
 fn alone(mut step: Step) -> Step {
     step.robots.iter_mut().for_each(|robot| robot.truth.world_from_camera_before = None);
     step

@@ -1,4 +1,4 @@
-//! One line makes a tool: a list like the real one, with a tool that exists only here.
+//! Test that one line defines a tool: a list like the real one, with a tool that exists only here.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

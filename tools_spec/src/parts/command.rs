@@ -1,4 +1,4 @@
-//! Replies to commands, robot by robot and hand by hand.
+//! Replies to commands, with reports on robots and hands.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,19 +7,18 @@ use super::episode::{Budget, PhaseReached, RobotFallen};
 use super::frames::PoseFrame;
 use super::quantities::Pose;
 
-/// The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are told to
-/// the millimetre, angles and quaternions to a thousandth. What is marked so is left out where the call
-/// asked for a short reply.
+/// The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are rounded to a
+/// millimetre, angles and quaternions to a thousandth. Marked fields are left out of a short reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CommandReply {
     /// Control steps of 20 ms that were executed.
     pub executed_steps: u32,
-    /// Why the command ended.
+    /// Reason for its end.
     pub stop_reason: StopReason,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// One report per robot that the command named; after `wait`, one per robot of the episode. In a short
-    /// reply without robots that stand where they stood, whose hands have no target and feel nothing.
+    /// One report per robot that the command named; after `wait`, per robot of the episode. A short reply
+    /// omits robots that have not moved and whose hands have no target and feel nothing.
     pub robots: Vec<RobotReport>,
     /// Every robot of the episode; in a short reply those that have fallen. Left out where the assistance
     /// is "paper".
@@ -32,18 +31,17 @@ pub struct CommandReply {
     pub budget: Budget,
 }
 
-/// Why a command ended.
+/// End of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// Every step that was asked for was executed.
+    /// Every requested step was executed.
     StepsDone,
-    /// The last phase of the task was reached, which has ended the episode.
+    /// The last phase of the task was reached, which ended the episode.
     TaskComplete,
     /// The episode's steps ran out; the episode has ended.
     StepBudgetExhausted,
-    /// The command of another operator was shorter, and this one was cut off with it; it goes on where a
-    /// further command takes it.
+    /// Another operator's command was shorter and cut this one off; a further command continues it.
     PartnerDone,
 }
 
@@ -52,7 +50,7 @@ pub enum StopReason {
 pub struct RobotReport {
     /// The robot, for example "A".
     pub robot: String,
-    /// The frame of wrist poses: the command's, or that of a walk's places; left out for that of the pelvis.
+    /// Frame of wrist poses, from the command or the walk's targets; left out for the pelvis frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// Its left arm and hand.
@@ -64,12 +62,12 @@ pub struct RobotReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<BaseReport>,
     /// Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under
-    /// the pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the
-    /// way walked. Left out of a short reply where the base has moved by less than a centimetre and a
-    /// hundredth of a radian, but not after `walk_to`, and where the assistance is "paper".
+    /// the pelvis at the start of the episode, z up, x along its heading. Drifts by up to 1 % of the distance
+    /// walked. Left out of a short reply where the base has moved by less than a centimetre and a hundredth
+    /// of a radian, but not after `walk_to`, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
-    /// The same in the room frame, where `frame` is that; left out otherwise. In a short reply it stands for
+    /// The same in the room frame, if that is `frame`; left out otherwise. In a short reply it replaces
     /// `pelvis_in_start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_room: Option<Pose>,
@@ -77,14 +75,14 @@ pub struct RobotReport {
     /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_motion: Option<BaseMotion>,
-    /// Waist joints whose target lay beyond a limit and was moved to it; left out where there are none.
+    /// Waist joints whose target exceeded a limit and was clamped; left out where there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waist_joints_clamped: Vec<String>,
-    /// Waist joints that rest at a limit; left out where there are none.
+    /// Waist joints at a limit; left out where there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waist_joints_at_limit: Vec<String>,
-    /// Fields of the base command that lay beyond what locomotion accepts and were moved to it, as
-    /// `vx_m_s`; left out where there are none.
+    /// Base command fields that exceeded locomotion's limits and were clamped, for example `vx_m_s`; left out
+    /// where there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub base_command_clamped: Vec<String>,
 }
@@ -100,17 +98,17 @@ pub struct BaseReport {
     /// Commanded height, where the measured one is more than 2 cm off; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub commanded_height_m: Option<f64>,
-    /// Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: to
-    /// within 3 cm after a walk of up to 2.5 s, 5 cm after a longer one. Only of a base that steps or
+    /// Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame:
+    /// within 3 cm after a walk of up to 2.5 s, 5 cm after a longer one. Only for a base that steps or
     /// settles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comes_to_rest_m: Option<[f64; 2]>,
-    /// Displacement of a base that was commanded to stand from its resting place, [forward, left] in metres
-    /// as it faced there: something pulled or pushed it. Left out below 2 cm.
+    /// Displacement from its resting place of a base commanded to stand, [forward, left] in metres by its
+    /// heading there: something pulled or pushed it. Left out below 2 cm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displaced_m: Option<[f64; 2]>,
-    /// True where it took a step during the command though it was commanded to stand, after arms that reach far
-    /// or what pulls at them; left out otherwise.
+    /// True if it stepped though commanded to stand, because its arms reached far or were pulled; left out
+    /// otherwise.
     #[serde(default, skip_serializing_if = "is_false")]
     pub stepped: bool,
 }
@@ -123,13 +121,13 @@ fn is_false(flag: &bool) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BaseState {
-    /// Both feet stay where they are, and the pelvis is as high as it gets.
+    /// Both feet stay in place, and the pelvis has reached its height.
     Standing,
     /// It walks as commanded.
     Stepping,
     /// It was commanded to stop and still steps, or its pelvis still rises or sinks to the commanded height.
     Settling,
-    /// It steps without a command: what its hands hold or touch, or a partner, pulls or pushes it.
+    /// It steps without a command: a held or touched object, or a partner, pulls or pushes it.
     Pushed,
 }
 
@@ -155,56 +153,54 @@ pub struct HandReport {
     /// Grip by the fingers' own torques; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<Grip>,
-    /// Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, of a
-    /// short reply where the grip is "two_sided", and where the assistance is "paper".
+    /// Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, of
+    /// a short reply where the grip is "two_sided", and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub presses: Vec<HandPart>,
-    /// Obstacle that the hand feels; left out where it feels none, of a short reply where `grip` tells it, and
+    /// Obstacle that the hand feels; left out where it feels none, of a short reply if `grip` says so, and
     /// where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
-    /// The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has
-    /// given way to since; of an arm without a wrist target, the pose that its joint targets stand for.
-    /// Left out of a short reply.
+    /// Commanded wrist pose in the present pelvis frame, without later yielding; for an arm without a wrist
+    /// target, the pose of its joint targets. Left out of a short reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<Pose>,
-    /// The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign
-    /// that is nearer to the target's. Left out of a short reply where the state is "arrived" or "idle".
+    /// Measured wrist pose in the present pelvis frame, its quaternion with the sign nearer to the target's.
+    /// Left out of a short reply where the state is "arrived" or "idle".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured: Option<Pose>,
     /// Distance from target to measured, in metres. Left out of a short reply where the state is "arrived"
     /// or "idle".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_error_m: Option<f64>,
-    /// Angle from target to measured, in radians; left out as the distance is.
+    /// Angle from target to measured, in radians; left out like the distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_error_rad: Option<f64>,
-    /// Yielding of the hand by the command's compliance: offset of the yielded target from `target`, [x, y,
-    /// z] in metres in the pelvis frame, against which its state is reported. Left out where it has not
-    /// yielded, and where the assistance is "paper".
+    /// Offset of the target that compliance has moved from `target`, [x, y, z] in metres in the pelvis frame;
+    /// its state refers to the moved target. Left out where it has not yielded, and where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub given_way_m: Option<[f64; 3]>,
     /// Its fingers; left out of a short reply where they have arrived or the grip is "two_sided".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<FingerReport>,
-    /// The joint of this arm and hand that works hardest; left out of a short reply where it works at less
-    /// than four fifths of its limit or is of a finger, as of each that presses, and where the assistance
-    /// is "paper".
+    /// Joint of this arm and hand with the largest share of its torque limit; left out of a short reply if
+    /// that is below 0.8 or of a finger, as of each that presses, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_effort: Option<Effort>,
-    /// Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints
-    /// feel it: a hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a
-    /// negative x. What moving the arm takes is not counted; an arm that hangs free may feel up to 5 N of
-    /// its own friction. Left out of a short reply where it is less than 1 N, of an arm that keeps its
-    /// joints and holds nothing less than 6 N, and where the assistance is "paper".
+    /// External force on the hand in newtons, [x, y, z] in the pelvis frame, by the arm's own joints: about
+    /// -4.9 along z for a held 0.5 kg, a negative x for a hand that presses ahead. Forces that move the arm
+    /// are excluded; a free arm may feel up to 5 N of its own friction. Left out of a short reply where it is
+    /// less than 1 N, for an arm that keeps its joints and holds nothing less than 6 N, and where the
+    /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
-    /// Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where
-    /// there are none.
+    /// Joints of this arm and hand whose target exceeded a limit and was clamped; left out where there are
+    /// none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_clamped: Vec<String>,
-    /// Joints of this arm that rest at a limit; left out where there are none, and of a short reply where
-    /// the state is "arrived" or "idle".
+    /// Joints of this arm at a limit; left out where there are none, and of a short reply where the state is
+    /// "arrived" or "idle".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_at_limit: Vec<String>,
 }
@@ -220,9 +216,9 @@ pub enum Grip {
     Touching,
     /// Thumb or fingers press on something and the others do not press against it: close those further.
     OneSided,
-    /// The thumb presses, and fingers or palm do. That is a hold, as phases ask for, where they press on
-    /// opposite sides, which a hand cannot feel: on a round thing that lies at the fingertips, or only
-    /// hangs in a bent hand, they press on neighbouring ones.
+    /// The thumb presses, and so do fingers or palm. Phases need pressure from opposite sides, which a hand
+    /// cannot feel: on a round object at the fingertips, or hanging in a bent hand, they press on
+    /// neighbouring sides.
     TwoSided,
 }
 
@@ -236,11 +232,11 @@ pub enum HandPart {
     Middle,
     /// The index finger.
     Index,
-    /// The palm, on which the thumb presses something: the arm feels nothing of that force.
+    /// The palm, against which the thumb presses; the arm does not feel this force.
     Palm,
 }
 
-/// Contact of a hand, as far as it can feel that.
+/// Contact that a hand can feel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Touch {
@@ -254,16 +250,16 @@ pub enum Touch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HandState {
-    /// There: a wrist within 5 mm and 0.05 rad, or of a hand that holds something, under which its arm
-    /// sags, within 15 mm and 0.15 rad; every finger joint within 0.06 rad.
+    /// At the target: a wrist within 5 mm and 0.05 rad, or with a load, under which the arm sags, within 15
+    /// mm and 0.15 rad; every finger joint within 0.06 rad.
     Arrived,
     /// A wrist without a target, whose arm keeps its joints.
     Idle,
-    /// Coming nearer.
+    /// Approaching.
     Moving,
-    /// Stopped short by load or contact: fingers around an object are, and an arm that was pushed away.
+    /// Stopped short by load or contact, for example fingers around an object or an arm pushed away.
     Blocked,
-    /// Stopped short because limits of joints, the arm's length or the robot's own body allow no more.
+    /// Stopped short by joint limits, the arm's length or the robot's own body.
     OutOfReach,
 }
 
@@ -274,10 +270,10 @@ pub struct FingerReport {
     /// State against their targets; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<HandState>,
-    /// Joint angles that were asked for, in radians. Left out of a short reply.
+    /// Commanded joint angles in radians. Left out of a short reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target_rad: Option<[f64; 7]>,
-    /// Joint angles that were measured, in radians.
+    /// Measured joint angles in radians.
     pub measured_rad: [f64; 7],
 }
 

@@ -1,4 +1,4 @@
-//! By whom an episode is driven.
+//! Operators of an episode, and the rules for them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 /// Minimum and maximum patience, in seconds.
 const PATIENCE_S: [f64; 2] = [0.05, 600.0];
 
-/// By whom an episode is driven.
+/// Operators and their rules.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Driving {
-    /// "per_robot": each robot has an operator of its own, who sees and commands that robot alone, by the
-    /// token that the reply has for it. "one" or null: one policy directs all robots.
+    /// "per_robot": each robot has its own operator, which sees and commands that robot alone, with its token
+    /// in the reply. "one" or null: one policy directs all robots.
     pub operators: Option<Operators>,
-    /// Seconds for which operators wait for one that does not command, before its robot holds still. Null:
-    /// 120. Refused where one policy directs all.
+    /// Seconds for which operators wait for another's command before its robot holds still. Null: 120.
+    /// Refused if one policy directs all.
     #[schemars(range(min = PATIENCE_S[0], max = PATIENCE_S[1]))]
     pub patience_s: Option<f64>,
     /// True: operators may talk to each other by the tool say, which is refused where one policy directs
@@ -23,22 +23,22 @@ pub struct Driving {
 }
 
 impl Driving {
-    /// The fields, as JSON names them.
+    /// Names of the fields in JSON.
     pub const FIELDS: [&str; 3] = ["operators", "patience_s", "talk"];
 
     const PATIENCE_S: f64 = 120.0;
 
-    /// Returns true if each robot has an operator of its own.
+    /// Returns true if each robot has its own operator.
     pub fn is_per_robot(&self) -> bool {
         self.operators == Some(Operators::PerRobot)
     }
 
-    /// Returns the seconds for which operators wait for one that does not command.
+    /// Returns the time in seconds for which operators wait for another operator's command.
     pub fn patience_s(&self) -> f64 {
         self.patience_s.unwrap_or(Driving::PATIENCE_S)
     }
 
-    /// Returns the JSON Schema of what [`Driving::validate`] demands of several fields together.
+    /// Returns the JSON Schema of the conditions in [`Driving::validate`] that concern several fields.
     pub(crate) fn conditions() -> Value {
         json!([
             { "required": ["operators"], "properties": { "operators": { "const": Operators::PerRobot } } },
@@ -46,8 +46,8 @@ impl Driving {
         ])
     }
 
-    /// Checks the patience, and that nothing is said of operators where there are none. The text says what
-    /// would work.
+    /// Checks the patience, and that fields about operators are given only if there are operators. Errors
+    /// state valid values.
     pub fn validate(&self) -> Result<(), String> {
         let given = [self.patience_s.map(|_| "patience_s"), self.talk.filter(|talk| *talk).map(|_| "talk")];
         if let (false, Some(field)) = (self.is_per_robot(), given.into_iter().flatten().next()) {
@@ -99,19 +99,18 @@ pub struct OperatorUse {
     pub robot: String,
     /// Its operator's requests.
     pub requests: u32,
-    /// Wall clock that the operator has thought since its first request, while no step was made, in seconds.
+    /// Wall-clock thinking time of the operator since its first request, without steps, in seconds.
     pub thinking_s: f64,
 }
 
-/// News for an operator with a reply.
+/// Activity of a partner, in a reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Partner {
-    /// The partner's robot, as "B".
+    /// Its robot, for example "B".
     pub robot: String,
     /// Its activity during the command.
     pub did: PartnerDid,
-    /// The tool by which its operator commanded it, of a plan that of the plan's command; left out where none
-    /// did.
+    /// Tool of its operator's command, or of the plan's present command; left out where there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
 }
@@ -122,8 +121,8 @@ pub struct Partner {
 pub enum PartnerDid {
     /// It followed its operator's command.
     Acted,
-    /// It held still: no command came for as long as the episode's patience lasts. Nobody waits for its
-    /// operator until it calls again.
+    /// It held still: no command came within the episode's patience. Nobody waits for its operator until it
+    /// calls again.
     HeldSilent,
     /// It held still: its operator has called finish.
     HeldFinished,
@@ -132,11 +131,11 @@ pub enum PartnerDid {
 /// Current activity of another operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Presence {
-    /// Its robot, as "B".
+    /// Name of its robot.
     pub robot: String,
     /// Its activity.
     pub state: PresenceState,
-    /// For how long it has thought since its last reply, in seconds; left out unless it is thinking.
+    /// Thinking time since its last reply, in seconds; left out unless it is thinking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thinking_s: Option<f64>,
 }
@@ -149,27 +148,27 @@ pub enum PresenceState {
     Absent,
     /// It thinks, and the others wait for it.
     Thinking,
-    /// Its command waits for those of the others.
+    /// Its command waits for other commands.
     Waiting,
     /// Its command is executed.
     Acting,
-    /// It has not commanded for longer than the others' patience, who go on without it.
+    /// It has not commanded within the others' patience; they go on without it.
     Silent,
     /// It has called finish.
     Finished,
 }
 
-/// Words of another operator.
+/// A partner's message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Heard {
-    /// The robot whose operator spoke, as "B".
+    /// The speaker's robot, for example "B".
     pub from: String,
-    /// The words.
+    /// The text.
     pub text: String,
-    /// The control step that the episode was at.
+    /// Control step of the episode.
     #[serde(default)]
     pub step: u32,
-    /// Number of the message among the speaker's, counted from 1.
+    /// Number of the speaker's message, counted from 1.
     #[serde(default)]
     pub number: u32,
 }

@@ -1,4 +1,4 @@
-//! The rules of an episode, the information that a policy gets, and the episode's status.
+//! The rules of an episode, the information for policies, and the status of an episode.
 
 use std::fmt;
 
@@ -44,14 +44,14 @@ pub enum Assistance {
     /// The benchmark's: images, joint angles, wrist poses, calibration, depth at pixels, distances of wrists
     /// from their targets, joints at a limit, and the budget; success at the end of the episode.
     Paper,
-    /// All that a robot could sense, how hands stand to their targets, who has fallen, phases as they are
-    /// reached, by what they are scored, and how to grasp.
+    /// All that a robot could sense, states of hands, falls, phases as they are reached, their conditions,
+    /// and how to grasp.
     #[default]
     Full,
 }
 
 impl Assistance {
-    /// Both.
+    /// Both levels.
     pub const ALL: [Assistance; 2] = [Assistance::Paper, Assistance::Full];
 
     /// Returns the name that JSON, command lines and reports use.
@@ -62,7 +62,7 @@ impl Assistance {
         }
     }
 
-    /// Describes the assistance with `disclosure` and `hints`, for the log of a program that starts.
+    /// Describes the assistance with `disclosure` and `hints`, for the log at a program's start.
     pub fn about(self, disclosure: Disclosure, hints: Hints) -> String {
         let sensed = match self {
             Assistance::Paper => "what the benchmark tells its agents",
@@ -80,7 +80,7 @@ impl Assistance {
         format!("assistance {self}: policies are told {sensed}, {success}{grasps}")
     }
 
-    /// Returns its disclosure of phases.
+    /// Returns the disclosure of phases at this level.
     pub fn disclosure(self) -> Disclosure {
         match self {
             Assistance::Paper => Disclosure::End,
@@ -88,7 +88,7 @@ impl Assistance {
         }
     }
 
-    /// Returns its hints.
+    /// Returns the hints at this level.
     pub fn hints(self) -> Hints {
         match self {
             Assistance::Paper => Hints::Off,
@@ -103,19 +103,19 @@ impl fmt::Display for Assistance {
     }
 }
 
-/// Version of the texts about tools that a policy reads.
+/// Variant of the texts about tools that a policy reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wording {
-    /// Assistance: `full` adds what only it offers.
+    /// Level of assistance; `full` adds texts on extra information.
     pub assistance: Assistance,
     /// Hints on grasping.
     pub hints: Hints,
-    /// Operator of one robot, or the policy of all.
+    /// Operator of one robot, or one policy for all robots.
     pub operators: Operators,
 }
 
 impl Wording {
-    /// Returns the texts for the operator of a robot.
+    /// Returns the variant for the operator of one robot.
     pub fn for_operator(self) -> Wording {
         Wording { operators: Operators::PerRobot, ..self }
     }
@@ -133,21 +133,21 @@ impl From<Hints> for Wording {
     }
 }
 
-/// Information that a policy may get and the benchmark's own policies do not.
+/// Information that a policy may get and the benchmark withholds from its own policies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExtraInformation {
-    /// Depth at every pixel of a picture.
+    /// Depth at every pixel of an image.
     DepthImages,
-    /// Depth at single pixels, where the benchmark's policies are learned ones.
+    /// Depth at single pixels. It is extra only under the protocol for learned policies.
     PixelDepth,
     /// The camera that sees all robots.
     ThirdPerson,
     /// Joint velocities.
     JointVelocities,
-    /// Torques of drives.
+    /// Torques of joint drives.
     JointTorques,
-    /// Forces of the world on hands.
+    /// External forces on hands.
     HandForces,
     /// Odometry.
     Odometry,
@@ -155,14 +155,14 @@ pub enum ExtraInformation {
     Gravity,
     /// Angular velocity and specific force of the pelvis.
     InertialReadings,
-    /// Conditions that the next phase lacks, and poses of held objects, as the simulator measures them.
+    /// Unmet conditions of the next phase, and poses of held objects, as the simulator measures them.
     PhaseConditions,
-    /// Pixels of an object by its name, as the simulator knows them.
+    /// Pixels of an object selected by name, from the simulator's ground truth.
     ObjectPixels,
 }
 
 impl ExtraInformation {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [ExtraInformation; 11] = [
         ExtraInformation::DepthImages,
         ExtraInformation::PixelDepth,
@@ -194,7 +194,7 @@ impl ExtraInformation {
         }
     }
 
-    /// Returns true if `full` assistance includes it, so that naming the assistance names it.
+    /// Returns true if `full` assistance includes this information, so that naming the assistance implies it.
     pub fn is_of_full_assistance(self) -> bool {
         match self {
             ExtraInformation::DepthImages
@@ -216,17 +216,17 @@ impl ExtraInformation {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Disclosure {
-    /// Every reply tells the phases reached, and the last phase ends the episode.
+    /// Every reply lists the phases reached, and the last phase ends the episode.
     #[default]
     Live,
-    /// Phases are disclosed once the episode has ended, which it does not do by itself on success: call finish.
+    /// Phases are disclosed after the episode, which success does not end: call finish.
     End,
     /// Phases are never disclosed, nor does success end the episode: call finish.
     Never,
 }
 
 impl Disclosure {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [Disclosure; 3] = [Disclosure::Live, Disclosure::End, Disclosure::Never];
 
     /// Returns the name that JSON, command lines and reports use.
@@ -238,7 +238,7 @@ impl Disclosure {
         }
     }
 
-    /// Returns true if phases are disclosed in an episode that has `ended` or goes on.
+    /// Returns true if phases are disclosed. `ended` is true after the end of the episode.
     pub fn tells(self, ended: bool) -> bool {
         match self {
             Disclosure::Live => true,
@@ -259,7 +259,7 @@ impl fmt::Display for Disclosure {
     }
 }
 
-/// Recipes in texts beside geometry.
+/// Grasping hints in texts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Hints {
@@ -271,7 +271,7 @@ pub enum Hints {
 }
 
 impl Hints {
-    /// Both.
+    /// Both variants.
     pub const ALL: [Hints; 2] = [Hints::On, Hints::Off];
 
     /// Returns the name that JSON, command lines and reports use.
@@ -294,14 +294,14 @@ impl fmt::Display for Hints {
 pub struct Budget {
     /// Control steps of 20 ms.
     pub steps_left: u32,
-    /// Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null
-    /// where the protocol sets no limit.
+    /// Seconds that the policy may still spend between calls; the simulator's time is not counted. Null where
+    /// the protocol sets no limit.
     pub wall_clock_left_s: Option<f64>,
-    /// The most steps that one command may ask for.
+    /// Maximum number of steps per command.
     pub steps_per_command: u32,
 }
 
-/// A phase of the task, and when it was reached.
+/// A reached phase of the task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PhaseReached {
     /// Name of the phase, for example `grasp_and_lift`.
@@ -322,8 +322,8 @@ pub struct NextPhase {
     /// Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the
     /// phase.
     pub lacks: Vec<String>,
-    /// Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its
-    /// own robot.
+    /// Objects that count as held for phases, by the simulator's contact forces; for an operator only those
+    /// of its robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held: Vec<HeldObject>,
 }
@@ -337,12 +337,12 @@ pub struct HeldObject {
     pub hand: String,
     /// The object.
     pub object: String,
-    /// Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright; after a walk that of its
-    /// places.
+    /// Frame of `middle_m` and `axis`: "level", the upright pelvis frame; after `walk_to`, the frame of its
+    /// targets.
     pub frame: PoseFrame,
     /// Middle of the object, [x, y, z] in metres.
     pub middle_m: [f64; 3],
-    /// Direction of its own z axis, length 1: [0, 0, 1] when it is upright.
+    /// Unit vector along its z axis: [0, 0, 1] if upright.
     pub axis: [f64; 3],
     /// Height of its lowest point above the floor, in metres.
     pub lowest_m: f64,

@@ -1,27 +1,27 @@
-//! The frames that points and poses may be given in.
+//! Frames of points and poses.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A frame of a robot. The brief of a start says what each is, so schemas name them only.
+/// A frame of a robot. The briefing at a start explains the frames, so schemas contain only their names.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseFrame {
-    /// In the robot's pelvis as it is at that moment: x forward, y left, z up. It leans and turns with the
-    /// pelvis.
+    /// The robot's present pelvis frame: x forward, y left, z up. It tilts and turns with the pelvis.
     #[default]
     Pelvis,
-    /// In the pelvis, but upright: z against gravity, x the way that the robot faces.
+    /// The pelvis frame, but upright: z against gravity, x along the robot's heading.
     Level,
-    /// On the floor under the pelvis as it was when the episode began, z up, x where the robot faced: it
-    /// stays in the room while the robot moves, as far as its odometry is right.
+    /// Origin on the floor below the pelvis at the episode's start; z up, x along the robot's heading at that
+    /// time. It is fixed in the room, up to odometry drift.
     Start,
-    /// The first robot's start frame, for every robot: a place in the room is the same to all of them.
+    /// The first robot's start frame, used for every robot, so that a place has the same coordinates for all
+    /// robots.
     Room,
 }
 
 impl PoseFrame {
-    /// Every frame.
+    /// All frames.
     const ALL: [PoseFrame; 4] = [PoseFrame::Pelvis, PoseFrame::Level, PoseFrame::Start, PoseFrame::Room];
 
     /// Returns true for the pelvis frame.
@@ -30,7 +30,7 @@ impl PoseFrame {
     }
 }
 
-/// Reads a field for which null stands for its default, too, as older schemas have it.
+/// Deserializes a field for which null also means its default, as in older schemas.
 pub fn null_is_default<'de, D, T>(deserializer: D) -> Result<T, D::Error>
 where
     D: Deserializer<'de>,

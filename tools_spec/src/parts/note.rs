@@ -1,5 +1,5 @@
-//! Notes of a player on its own play, for later readers of the episode. A note is no tool: it does not affect
-//! the episode, and no policy sees it.
+//! Notes of a player on its play, for later readers of the episode. A note is not a tool call: it does not
+//! affect the episode, and no policy sees it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,43 +9,43 @@ use crate::error::SpecError;
 use crate::limits::{ROBOT_PATTERN, one_of};
 use crate::tool::read_as;
 
-/// Maximum number of characters of a note: more than a model says at once.
+/// Maximum number of characters of a note: more than a model outputs at once.
 const MAX_CHARACTERS: usize = 50_000;
-/// Number of characters that results keep of the end of a model's play.
+/// Maximum number of characters that results keep of the text with which a model's play ended.
 const MAX_ENDING_CHARACTERS: usize = 500;
 /// Maximum number of characters of a model's name.
 const MAX_NAME_CHARACTERS: usize = 200;
-/// Maximum tokens, dollars and seconds of one note; larger numbers are counting errors.
+/// Maximum tokens, dollars and seconds in one note; larger numbers are counting errors.
 const MAX_TOKENS: u32 = 1_000_000_000;
 const MAX_USD: f64 = 1e6;
 const MAX_SECONDS: f64 = 1e6;
 
-/// A player's words on its own play, kept in the recording for those who read the episode
-/// later: what a model thought, what it said, what that took. It changes nothing of the episode, costs no
-/// call, no steps and no time, and no policy sees it.
+/// A player's note on its play, recorded for later readers of the episode: a model's thoughts, its messages,
+/// and their cost. It does not change the episode, costs no call, no steps and no time, and no policy sees
+/// it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Note {
-    /// The words, at most 50,000 characters. They may be empty where the note says what was used.
+    /// The text, at most 50,000 characters. It may be empty if the note reports usage.
     #[schemars(length(max = MAX_CHARACTERS))]
     pub text: String,
-    /// Kind of the words. Null: a note.
+    /// Kind of the text. Null: a note.
     pub kind: Option<NoteKind>,
     /// The robot that it is about, for example "A". Null: all, and for the operator of a robot its own.
     #[schemars(regex(pattern = ROBOT_PATTERN))]
     pub robot: Option<String>,
-    /// Tokens that the model read and wrote for it. Null: not said.
+    /// Tokens that the model read and wrote for it. Null: unknown.
     pub tokens: Option<TokenCount>,
-    /// Cost in US dollars. Null: not said.
+    /// Cost in US dollars. Null: unknown.
     #[schemars(range(min = 0, max = MAX_USD))]
     pub usd: Option<f64>,
-    /// The model, by the name that its server has for it, at most 200 characters. Null: not said.
+    /// Name of the model on its server, at most 200 characters. Null: unknown.
     #[schemars(length(max = MAX_NAME_CHARACTERS))]
     pub model: Option<String>,
-    /// Seconds that the model took. Null: not said.
+    /// Seconds that the model took. Null: unknown.
     #[schemars(range(min = 0, max = MAX_SECONDS))]
     pub seconds: Option<f64>,
-    /// End of the model's play. Null: it goes on.
+    /// End of the model's play. Null: none yet.
     pub ending: Option<AgentEnding>,
 }
 
@@ -61,17 +61,17 @@ pub enum AgentEnding {
     Refused,
     /// A filter of the model's endpoint held back its reply.
     ContentFilter,
-    /// The model called no tool, several times in turn.
+    /// The model repeatedly called no tool.
     Silent,
-    /// The tokens that it may use were used up.
+    /// Its token limit was reached.
     TokenLimit,
-    /// The money that it may spend was spent.
+    /// Its price limit was reached.
     PriceLimit,
-    /// The calls that it may make were made.
+    /// Its call limit was reached.
     CallLimit,
-    /// The time that it may take was over.
+    /// Its time limit was reached.
     TimeLimit,
-    /// The conversation became longer than the model can read.
+    /// The conversation exceeded the model's context.
     Context,
     /// The model's endpoint gave no reply.
     Endpoint,
@@ -95,21 +95,21 @@ impl AgentEnding {
         }
     }
 
-    /// Returns true if the end of the episode says as much.
+    /// Returns true if the end of the episode implies this end.
     pub fn is_of_the_episode(self) -> bool {
         matches!(self, AgentEnding::Success | AgentEnding::Finished)
     }
 }
 
-/// Kind of a note's words.
+/// Kind of a note's text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoteKind {
     /// Thoughts of a model before it acted.
     Thought,
-    /// Words of a model.
+    /// Text of a model.
     Message,
-    /// Anything else, as what a program did on its own.
+    /// Anything else, such as a program's actions.
     Note,
 }
 
@@ -117,13 +117,13 @@ pub enum NoteKind {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TokenCount {
-    /// Tokens that the model read, those from a cache included.
+    /// Input tokens, including cached ones.
     #[schemars(range(max = MAX_TOKENS))]
     pub input: u32,
-    /// Tokens that the model wrote, its thoughts included.
+    /// Output tokens, including thoughts.
     #[schemars(range(max = MAX_TOKENS))]
     pub output: u32,
-    /// Number of read tokens that came from a cache. Left out: none.
+    /// Input tokens from a cache. Left out: none.
     #[serde(default)]
     #[schemars(range(max = MAX_TOKENS))]
     pub cached: u32,
@@ -133,7 +133,7 @@ impl Note {
     /// Name in refusals.
     pub const NAME: &str = "notes";
 
-    /// Fields of a note, of which it has at least one.
+    /// Returns the JSON Schema of the fields of which a note has at least one.
     pub(crate) fn conditions() -> Value {
         let mut used = one_of(&[("tokens", "object"), ("usd", "number"), ("seconds", "number")]);
         let words = json!({ "properties": { "text": { "minLength": 1 } } });
@@ -141,7 +141,7 @@ impl Note {
         used
     }
 
-    /// Returns a note that works.
+    /// Returns a valid note.
     pub fn example() -> Note {
         Note {
             text: "The bottle is 0.31 m ahead of A, a bit to the right. I reach above it first.".into(),
@@ -155,19 +155,19 @@ impl Note {
         }
     }
 
-    /// Reads and checks a note.
+    /// Parses and checks a note.
     pub fn parse(body: Value) -> Result<Note, SpecError> {
         let note: Note = read_as(Note::NAME, body, || json!(Note::example()))?;
         note.validate().map_err(|reason| SpecError::Invalid { tool: Note::NAME, reason })?;
         Ok(note)
     }
 
-    /// Returns true if the note says what was used.
+    /// Returns true if the note reports usage.
     fn reports_usage(&self) -> bool {
         self.tokens.is_some() || self.usd.is_some() || self.seconds.is_some()
     }
 
-    /// Checks lengths and numbers. The text says what would work.
+    /// Checks lengths and numbers. Errors state valid values.
     pub fn validate(&self) -> Result<(), String> {
         let long = |name: &str, text: &str, most: usize| match text.chars().count() {
             count if count > most => {
@@ -202,11 +202,11 @@ impl Note {
 pub struct Usage {
     /// Number of notes.
     pub notes: u32,
-    /// Tokens that models read, those from a cache included.
+    /// Input tokens of models, including cached ones.
     pub input_tokens: u64,
-    /// Tokens that models wrote.
+    /// Output tokens of models.
     pub output_tokens: u64,
-    /// Number of read tokens that came from a cache.
+    /// Number of input tokens from a cache.
     pub cached_tokens: u64,
     /// Cost in US dollars; left out where no note has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -217,7 +217,7 @@ pub struct Usage {
     /// The models that notes name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
-    /// Parts of the sums that belong to one robot, of notes that name it; left out where none does.
+    /// Sums for each robot, from notes that name it; left out where none does.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<RobotUsage>,
     /// Ends of the models' play: one for all robots, or one for each that has reported it.
@@ -225,7 +225,7 @@ pub struct Usage {
     pub endings: Vec<ModelEnding>,
 }
 
-/// Usage of the model of one robot.
+/// Usage of one robot's model.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotUsage {
     /// The robot that it directed.
@@ -233,11 +233,11 @@ pub struct RobotUsage {
     /// The model, as its latest note names it; left out where none does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
-    /// Tokens that it read, those from a cache included.
+    /// Input tokens, including cached ones.
     pub input_tokens: u64,
-    /// Tokens that it wrote.
+    /// Output tokens.
     pub output_tokens: u64,
-    /// Number of read tokens that came from a cache.
+    /// Number of input tokens from a cache.
     pub cached_tokens: u64,
     /// Cost in US dollars; left out where no note has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -247,7 +247,7 @@ pub struct RobotUsage {
     pub model_s: Option<f64>,
 }
 
-/// End of a model's play, in its own words, too.
+/// End of a model's play, with its own text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelEnding {
     /// The robot that it directed; left out where it directed all.
@@ -255,12 +255,12 @@ pub struct ModelEnding {
     pub robot: Option<String>,
     /// The end.
     pub ending: AgentEnding,
-    /// The words of the model or of its endpoint, as of a refusal; empty where there are none.
+    /// Text of the model or its endpoint, for example a refusal; empty where there is none.
     pub text: String,
 }
 
 impl ModelEnding {
-    /// Describes the end, with the robot where the model directed one alone.
+    /// Describes the end, prefixed with the robot if the model directed only one.
     pub fn words(&self) -> String {
         let words = self.ending.words();
         self.robot.as_ref().map_or_else(|| words.into(), |robot| format!("{robot}: {words}"))
@@ -268,7 +268,7 @@ impl ModelEnding {
 }
 
 impl Usage {
-    /// Adds what a note says.
+    /// Adds the usage and the end that a note reports.
     pub fn add(&mut self, note: &Note) {
         let TokenCount { input, output, cached } = note.tokens.unwrap_or_default();
         self.notes += 1;
@@ -290,7 +290,7 @@ impl Usage {
         }
     }
 
-    /// Returns the part of a robot, which is added if it is missing.
+    /// Returns the entry of a robot, which is added if it is missing.
     fn robot_mut(&mut self, robot: &str) -> &mut RobotUsage {
         let index = self.robots.iter().position(|known| known.robot == robot).unwrap_or(self.robots.len());
         if index == self.robots.len() {
@@ -299,7 +299,7 @@ impl Usage {
         &mut self.robots[index]
     }
 
-    /// Returns the ends of models' play that the end of the episode does not say.
+    /// Returns the ends of models' play that the end of the episode does not imply.
     pub fn own_endings(&self) -> impl Iterator<Item = &ModelEnding> {
         self.endings.iter().filter(|ended| !ended.ending.is_of_the_episode())
     }
@@ -317,7 +317,7 @@ impl RobotUsage {
     }
 }
 
-/// Adds numbers that may be unknown; the sum is unknown if both are.
+/// Adds two numbers, each of which may be unknown. The sum is unknown if both are.
 fn added(total_value: Option<f64>, more_value: Option<f64>) -> Option<f64> {
     match (total_value, more_value) {
         (None, None) => None,

@@ -1,4 +1,4 @@
-//! Images in JSON and MessagePack: their formats for programs, and the naming of their pixels.
+//! Images in JSON and MessagePack: formats for programs, and regions of pixels.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use schemars::JsonSchema;
@@ -9,8 +9,8 @@ use crate::limits;
 /// Formats of an observation's images.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Formats {
-    /// "png"; "rgb" for the bytes of each pixel row by row, which come in `arrays` then; or "link" for the
-    /// paths of PNG files, which come in `links`. Null: "png".
+    /// "png"; "rgb" for row-major pixel bytes in `arrays`; or "link" for paths of PNG files in `links`. Null:
+    /// "png".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<ImageFormat>,
     /// Depth along the optical axis at every pixel, in `arrays`: "float16" for little-endian numbers in
@@ -21,7 +21,7 @@ pub struct Formats {
 }
 
 impl Formats {
-    /// The fields, as JSON names them.
+    /// Names of the fields in JSON.
     pub const FIELDS: [&str; 2] = ["images", "depth"];
 }
 
@@ -33,7 +33,7 @@ pub enum ImageFormat {
     Png,
     /// Three bytes a pixel.
     Rgb,
-    /// A path under which the server gives the PNG file.
+    /// Path of the PNG file on the server.
     Link,
 }
 
@@ -41,18 +41,18 @@ pub enum ImageFormat {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthFormat {
-    /// Numbers of half precision, in metres.
+    /// Half-precision numbers in metres.
     Float16,
     /// A PNG file, in millimetres.
     Png16,
 }
 
-/// A PNG file; base64 in JSON, bytes as they are in MessagePack.
+/// A PNG file; base64 in JSON, raw bytes in MessagePack.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Png(pub Vec<u8>);
 
 impl Png {
-    /// Returns the file as base64, as JSON and MCP carry it.
+    /// Returns the file as base64, which JSON and MCP use.
     pub fn to_base64(&self) -> String {
         BASE64_STANDARD.encode(&self.0)
     }
@@ -83,7 +83,7 @@ impl JsonSchema for Png {
     }
 }
 
-/// Bytes: base64 in JSON, bytes as they are in MessagePack.
+/// Bytes; base64 in JSON, raw bytes in MessagePack.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bytes(pub Vec<u8>);
 
@@ -112,7 +112,7 @@ impl JsonSchema for Bytes {
     }
 }
 
-/// Pixels of one camera, row by row from the top left. The size is that of its calibration.
+/// Pixels of one camera, row by row from the top left. The calibration has their size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraArrays {
     /// The robot whose head camera it is.
@@ -134,10 +134,10 @@ pub struct CameraArrays {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PixelRegion {
-    /// Its top left pixel [u, v], as [100, 80].
+    /// Top left [u, v], such as [100, 80].
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub from: [i64; 2],
-    /// Its bottom right one, as [220, 170].
+    /// Bottom right, such as [220, 170].
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub to: [i64; 2],
     /// 10: every tenth pixel across and down. Each is 30 bytes of the reply.
@@ -146,13 +146,13 @@ pub struct PixelRegion {
 }
 
 impl PixelRegion {
-    /// Returns the number of its pixels with another stride, which is not zero.
+    /// Returns the number of pixels in the rectangle with the given stride, which must not be zero.
     pub(crate) fn count(&self, stride: u32) -> u128 {
         let along = |axis: usize| u128::from(self.from[axis].abs_diff(self.to[axis]) / u64::from(stride)) + 1;
         along(0).saturating_mul(along(1))
     }
 
-    /// Returns the pixels that it names, row by row. Count them first.
+    /// Returns the pixels in the region, row by row. Check their number first.
     pub(crate) fn pixels(&self) -> Vec<[i64; 2]> {
         let along = |axis: usize| {
             let ends = [self.from[axis].min(self.to[axis]), self.from[axis].max(self.to[axis])];

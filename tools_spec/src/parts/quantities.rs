@@ -1,10 +1,10 @@
-//! Poses, numbers by joint, and base commands with what locomotion accepts of them.
+//! Poses, numbers by joint, base commands, and the limits of locomotion.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-/// A pose in the frame that the field which holds it names.
+/// A pose in the frame that its field names.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pose {
     /// [x, y, z] in metres.
@@ -13,14 +13,14 @@ pub struct Pose {
     pub quaternion_wxyz: [f64; 4],
 }
 
-/// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON
-/// carries them to four decimals, which a model reads in a third of the text; MessagePack, which programs
-/// ask for, to six.
+/// One number per joint, in the robot's published joint order; a JSON object from joint name to number. JSON
+/// has four decimals, for which a model reads a third of the text. MessagePack, which programs request, has
+/// six.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointValues(pub Vec<(String, f64)>);
 
 impl JointValues {
-    /// Returns true if it has no joint.
+    /// Returns true if there are no joints.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -34,7 +34,7 @@ impl JointValues {
 impl Serialize for JointValues {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let parts = if serializer.is_human_readable() { 1e4 } else { 1e6 };
-        // Adding zero makes the zero of tiny negative values a positive one.
+        // Adding zero turns the negative zero of tiny negative values into a positive one.
         let rounded = |value: f64| (value * parts).round() / parts + 0.0;
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, rounded(*value))))
     }
@@ -61,10 +61,10 @@ impl JsonSchema for JointValues {
     }
 }
 
-/// Columns of a base command, in the order of action rows. Fields and columns have these names.
+/// Columns of a base command, in the order of action rows. Fields have the same names.
 pub const BASE_COLUMNS: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
-/// The base command in force. Velocities are zero between commands; the height persists.
+/// The present base command. Velocities are zero between commands; the height persists.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseCommand {
     /// Forward velocity in metres per second.
@@ -77,7 +77,7 @@ pub struct BaseCommand {
     pub pelvis_height_m: f64,
 }
 
-/// The base commands that locomotion accepts; what lies beyond is moved to the limit and reported.
+/// Base commands that locomotion accepts; values beyond are clamped and reported.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseLimits {
     /// Forward velocity.
@@ -90,7 +90,7 @@ pub struct BaseLimits {
     pub pelvis_height_m: Range,
 }
 
-/// From `min` to `max`, both accepted, in the unit of the field that holds it.
+/// From `min` to `max`, both included, in the unit of its field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Range {
     /// The smallest value accepted.

@@ -1,4 +1,4 @@
-//! Specifications of tools in the form that the official SDKs of model hosts accept.
+//! Specifications of tools in the formats that the official SDKs of model hosts accept.
 
 use serde_json::{Map, Value, json};
 
@@ -7,7 +7,7 @@ use super::strict::SHORT;
 use crate::tool::Tool as _;
 use crate::tools::{Finish, Observe};
 
-/// Host whose form a specification has.
+/// Host format of a specification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// OpenAI's Responses API, strict.
@@ -21,7 +21,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Every form.
+    /// All formats.
     pub const ALL: [Format; 4] = [Format::OpenAi, Format::OpenAiChat, Format::Anthropic, Format::Mcp];
 
     /// Returns the name that callers use.
@@ -34,14 +34,14 @@ impl Format {
         }
     }
 
-    /// Returns the form called `name`.
+    /// Returns the format called `name`.
     pub fn find(name: &str) -> Option<Format> {
         Format::ALL.into_iter().find(|format| format.name() == name)
     }
 }
 
 impl ToolSpec {
-    /// Returns the tool in the form of `format`.
+    /// Returns the tool in the format `format`.
     pub fn formatted(&self, format: Format) -> Value {
         match format {
             Format::OpenAi => {
@@ -69,10 +69,10 @@ impl ToolSpec {
         })
     }
 
-    /// Returns the tool for MCP. A host that leaves `short` out gets the short reply, as the server's
-    /// instructions say. The tool has no output schema, since clients drop the images of tools that declare
-    /// one. It has only annotations that differ from MCP's defaults, because a model reads the list of tools
-    /// in every conversation.
+    /// Returns the tool for MCP. If a host omits `short`, the reply is short, as the server's instructions
+    /// state. The tool has no output schema, because clients drop the images of tools that declare one. It
+    /// only has annotations that differ from MCP's defaults, because a model reads the list of tools in every
+    /// conversation.
     fn of_mcp(&self) -> Value {
         let mut schema = Value::Object(self.lenient_schema());
         slim(&mut schema);
@@ -94,18 +94,18 @@ impl ToolSpec {
 }
 
 impl ToolSpec {
-    /// Returns true if MCP clients may get its reply as structured content. Clients drop the images of a tool
-    /// that declares such content.
+    /// Returns true if MCP clients may get the reply as structured content. Clients drop the images of a tool
+    /// that declares structured content.
     pub fn has_structure(&self) -> bool {
         self.name != Observe::NAME
     }
 
-    /// Returns the tool for MCP clients that want structured content: with an outline of its reply.
+    /// Returns the tool, with an outline of its reply, for MCP clients that request structured content.
     pub fn structured(&self) -> Value {
         let mut tool = self.of_mcp();
         if self.has_structure() {
             tool["outputSchema"] = match self.name {
-                // An operator that leaves before the others gets a status in place of the result.
+                // An operator that leaves before the others gets a status instead of the result.
                 Finish::NAME => json!({ "type": "object" }),
                 _ => outline(&self.reply_schema),
             };
@@ -114,7 +114,7 @@ impl ToolSpec {
     }
 }
 
-/// Returns the schema of an object with the types of its own fields alone.
+/// Returns the schema of an object with only the types of its own fields.
 fn outline(schema: &Value) -> Value {
     let kind = |of: &Value| match &of["type"] {
         Value::Null => json!({}),
@@ -127,10 +127,10 @@ fn outline(schema: &Value) -> Value {
 
 /// Required fields with self-explanatory names.
 const PLAIN_NAMES: [&str; 3] = ["episode_id", "robot", "robots"];
-/// Fields with self-explanatory names, beside those of the left hand and in the pelvis frame.
+/// Fields whose names are self-explanatory, given the texts on the left hand and on the pelvis frame.
 const PLAIN_EVERYWHERE: [&str; 4] = ["right_position_m", "right_quaternion_wxyz", "vx_m_s", "yaw_rate_rad_s"];
 
-/// Drops parts that names already express or that the server checks: defaults, and the exclusion of other
+/// Removes parts that names already express or that the server checks: defaults, and the exclusion of other
 /// fields.
 fn slim(schema: &mut Value) {
     match schema {

@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
-/// Rewrites two types of a field as two alternatives. Strict hosts and common MCP clients read those; not all
-/// of them read a list of types.
+/// Rewrites a field's two types as two alternatives. Strict hosts and common MCP clients read alternatives;
+/// some do not read a list of types.
 pub fn as_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(kinds)) = object.get("type") else { return };
     let kinds = kinds.clone();
@@ -21,8 +21,8 @@ pub fn as_choices(object: &mut Map<String, Value>) {
     object.insert("anyOf".into(), choices.into());
 }
 
-/// Makes nullable fields optional instead: at every level, or only within lists if the call's own fields have
-/// to stay nullable. Their texts change accordingly.
+/// Makes nullable fields optional: at every level if `own_fields`, otherwise only within lists, because the
+/// call's own fields must remain nullable. Their texts change accordingly.
 pub fn leave_out(schema: &mut Value, own_fields: bool) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| leave_out(item, own_fields)),
@@ -54,7 +54,7 @@ fn leave_out_own(object: &mut Map<String, Value>) {
     }
 }
 
-/// Returns the schema of a nullable field as that of an optional one.
+/// Returns the schema of a nullable field as the schema of an optional field.
 fn the_choice_beside_null(property: &Value) -> Option<Value> {
     let choices = property["anyOf"].as_array()?;
     let is_null = |choice: &&Value| choice["type"] == "null";

@@ -1,4 +1,4 @@
-//! The REST interface as OpenAPI 3.1, from the same types that read and write it.
+//! The REST interface as OpenAPI 3.1, generated from the types that read and write it.
 
 use serde_json::{Map, Value, json};
 
@@ -12,8 +12,8 @@ use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
 
-/// Returns the document of a server of `version` with these tools. Each tool has a path of its own, so that
-/// generated clients have a method for each.
+/// Returns the document of a server of `version` with these tools. Each tool has a separate path, so that
+/// generated clients have a method for each tool.
 pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
     let mut paths = paths_without_tools();
     for spec in tools {
@@ -63,7 +63,7 @@ fn tool(spec: &ToolSpec) -> Value {
     call
 }
 
-/// Describes an answer without a body.
+/// Describes the operation that adds a note; its response has no body.
 fn note() -> Value {
     let mut schema = body_schema::<Note>(Wording::from(Hints::On));
     schema["anyOf"] = Note::conditions();
@@ -124,7 +124,7 @@ fn list_tools(specs: Value) -> Value {
     list
 }
 
-/// Returns a page, which is a few lines of text for clients that do not accept `text/html`.
+/// Describes an HTML page. Clients that do not accept `text/html` get a few lines of text.
 fn page(id: &str, description: &str) -> Value {
     let description =
         format!("{description} For a call that does not accept text/html, a few lines of text.");
@@ -154,8 +154,8 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
-/// Adds to every reply of an episode its step and a failure of its recording. Operators of single robots also
-/// get the states and messages of the others.
+/// Adds the episode's step and a failure of its recording to a reply of an episode. Operators of single
+/// robots also get the states and messages of the others.
 fn with_notice(mut reply: Value) -> Value {
     let list =
         |of: Value, description: &str| json!({ "type": "array", "items": of, "description": description });

@@ -6,18 +6,18 @@ use serde_json::{Map, Value};
 use crate::limits::bound_numbers;
 use crate::parts::{Assistance, Operators, Wording};
 
-/// Marks of fields for policies with full assistance, and for operators.
+/// Marks of fields for policies with full assistance, and of fields for operators.
 const FULL_ONLY: &str = "full_only";
 const FOR_OPERATORS: &str = "for_operators";
 
-/// Returns the schema of `T` for replies. It is not strict, because the server itself sends them.
+/// Returns the schema of `T` for replies. It is not strict, because the server itself sends replies.
 pub fn plain_schema<T: JsonSchema>() -> Value {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Returns the schema of `T` as arguments in a list of tools. Its texts are those for the policy's
-/// assistance. If one policy directs all robots, the fields for operators are left out.
+/// Returns the schema of `T` as arguments in a list of tools. Its texts depend on the policy's assistance. If
+/// one policy directs all robots, the fields for operators are left out.
 pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     if wording.operators == Operators::One {
@@ -27,8 +27,8 @@ pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     schema
 }
 
-/// Returns the schema of `T` as a body that is parsed. It excludes values that the checks refuse. The maximum
-/// number of control steps is added later.
+/// Returns the schema of `T` as a request body. It excludes values that the checks refuse. The maximum number
+/// of control steps is added later.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     word(&mut schema, wording);
@@ -68,7 +68,7 @@ fn leave_to_operators(schema: &mut Value) {
     }
 }
 
-/// Removes a mark from the fields that have it, or, if `with_fields`, those fields.
+/// Removes a mark from all fields that have it. If `with_fields`, removes these fields instead.
 fn drop_marked(object: &mut Map<String, Value>, mark: &str, with_fields: bool) {
     let Some(Value::Object(properties)) = object.get_mut("properties") else { return };
     let mut left = Vec::new();

@@ -1,5 +1,5 @@
-//! JSON Schema for a reader, which is a model that sees the list of an episode's tools. It contains types,
-//! lengths and bounds, and leaves out texts that refusals contain.
+//! JSON Schema for a model that reads the list of an episode's tools. It contains types, lengths and bounds,
+//! and omits texts that refusals contain.
 
 use serde_json::{Map, Value};
 
@@ -7,7 +7,7 @@ use super::nullable::{as_choices, leave_out};
 use super::strict::{list_choices, unwrap_lines};
 use crate::limits::LARGEST;
 
-/// Keywords for validators alone: combinations of fields, and numbers that no caller would send.
+/// Keywords that only validators need.
 const FOR_VALIDATORS: &[&str] = &[
     "$schema",
     "title",
@@ -21,8 +21,8 @@ const FOR_VALIDATORS: &[&str] = &[
     "uniqueItems",
 ];
 
-/// Rewrites the schema of a body: fields that may be null may be left out, and parts that only validators
-/// need are dropped.
+/// Rewrites the schema of a body. Nullable fields become optional, and parts that only validators need are
+/// removed.
 pub fn make_readable(schema: &mut Value) {
     for_each(schema, &mut |object| {
         list_choices(object);
@@ -37,7 +37,7 @@ pub fn make_readable(schema: &mut Value) {
     });
 }
 
-/// Calls `change` with every schema below `schema`, itself included. Properties may be called like keywords.
+/// Calls `change` with `schema` and every schema below it. Properties may have the names of keywords.
 fn for_each(schema: &mut Value, change: &mut impl FnMut(&mut Map<String, Value>)) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| for_each(item, change)),
@@ -56,13 +56,13 @@ fn for_each(schema: &mut Value, change: &mut impl FnMut(&mut Map<String, Value>)
     }
 }
 
-/// Returns true for a bound that is only the largest number of the contract or of its type.
+/// Returns true for a bound that is merely the largest number of the contract or of the bounded type.
 fn is_no_bound(keyword: &str, value: &Value) -> bool {
     let far = value.as_f64().is_some_and(|bound| bound.abs() >= LARGEST);
     far && ["minimum", "maximum"].contains(&keyword)
 }
 
-/// Shortens the field of a command that takes the arguments of another tool of the list.
+/// Shortens the field of a command that contains the arguments of another tool in the list.
 pub fn refer_to_list(properties: &mut Map<String, Value>, tool: &str) {
     if let Some(Value::Object(arguments)) = properties.get_mut(tool) {
         arguments.remove("properties");

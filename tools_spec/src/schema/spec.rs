@@ -1,4 +1,4 @@
-//! Tools as the hosts of language models need them.
+//! Specifications of tools for hosts of language models.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -12,67 +12,67 @@ use crate::parts::Wording;
 use crate::tool::{Route, Tool};
 use crate::tools::{Observe, SendPlan};
 
-/// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.
+/// A tool as a policy's host needs it, for OpenAI, Anthropic and MCP.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ToolSpec {
-    /// The name a caller uses.
+    /// Name that callers use.
     pub name: &'static str,
     /// Description of the tool for the model.
     pub description: String,
-    /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
+    /// Strict JSON Schema of the arguments, with `episode_id` if the tool acts on an episode.
     pub input_schema: Map<String, Value>,
-    /// This schema with the defaults of optional fields.
+    /// The same schema with the defaults of optional fields.
     #[serde(skip)]
     with_defaults: Map<String, Value>,
-    /// The schema of [`ToolSpec::body_schema`], where fields that count control steps are only marked.
+    /// The schema of [`ToolSpec::body_schema`], in which fields that count control steps are only marked.
     #[serde(skip)]
     marked_body: Value,
-    /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of
-    /// a tool that declares one), so it is only part of the OpenAPI description.
+    /// JSON Schema of the reply. Hosts of language models do not need it (MCP clients drop the images of a
+    /// tool that declares one), so it is only part of the OpenAPI description.
     #[serde(skip)]
     pub reply_schema: Value,
-    /// True if the call leaves the world as it was.
+    /// True if the call leaves the world unchanged.
     pub read_only: bool,
-    /// True if calling it again changes nothing more.
+    /// True if a repeated call changes nothing further.
     #[serde(skip)]
     pub idempotent: bool,
     /// True if the tool acts on an episode that `start_episode` made.
     pub on_episode: bool,
-    /// True if only operators that may talk to each other are offered it.
+    /// True if the tool is offered only to operators that may talk to each other.
     #[serde(skip)]
     pub for_operators: bool,
-    /// True if only policies with full assistance are offered it.
+    /// True if the tool is offered only to policies with full assistance.
     #[serde(skip)]
     pub full_only: bool,
-    /// True if language models are not offered it.
+    /// True if the tool is not offered to language models.
     #[serde(skip)]
     pub for_programs: bool,
     /// True if its schema is strict.
     #[serde(skip)]
     pub strict: bool,
-    /// Its REST route.
+    /// REST route of the tool.
     pub route: Route,
 }
 
-/// A tool of an episode that runs, for a reader: its route names the episode, and its body is described as
-/// the episode's rules have it.
+/// A tool of a running episode, for a reader. Its route contains the episode's id, and its body schema
+/// follows the episode's rules.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeToolSpec {
-    /// The name a caller uses.
+    /// Name that callers use.
     pub name: &'static str,
     /// Description of the tool for the model.
     pub description: String,
-    /// True if the call leaves the world as it was.
+    /// True if the call leaves the world unchanged.
     pub read_only: bool,
-    /// Its REST route.
+    /// REST route of the tool.
     pub route: Route,
     /// JSON Schema of the body without texts that refusals contain.
     pub body_schema: Value,
 }
 
 impl ToolSpec {
-    /// Returns the specification of `T`, which acts on an episode; without a path to name it, the arguments
-    /// carry `episode_id`. It may be limited to operators that talk.
+    /// Returns the specification of `T`, which acts on an episode. Outside REST, where the path names the
+    /// episode, the arguments contain `episode_id`. The tool may be limited to operators that talk.
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
         if spec.input_schema["properties"].get(SHORT).is_none() {
@@ -107,19 +107,19 @@ impl ToolSpec {
         }
     }
 
-    /// Lets a body have further fields, each with its schema.
+    /// Allows additional fields in a body, each with its schema.
     pub(crate) fn allow(&mut self, fields: &Map<String, Value>) {
         if let Value::Object(properties) = &mut self.marked_body["properties"] {
             properties.extend(fields.clone());
         }
     }
 
-    /// Requires a body to fit one of these schemas, too.
+    /// Requires a body to match one of these schemas as well.
     pub(crate) fn demand_one_of(&mut self, conditions: Value) {
         self.marked_body["anyOf"] = conditions;
     }
 
-    /// Returns the schema of a plan's command that names this tool. A command with `until` may have more
+    /// Returns the schema of a plan's command that uses this tool. A command with `until` may have more
     /// steps.
     pub(crate) fn as_planned(&self) -> Value {
         let mut arguments = self.marked_body.clone();
@@ -136,7 +136,7 @@ impl ToolSpec {
         command
     }
 
-    /// Requires the commands of a plan to fit one of these schemas, too.
+    /// Requires the commands of a plan to match one of these schemas as well.
     pub(crate) fn demand_of_commands(&mut self, planned: Vec<Value>) {
         self.marked_body["properties"]["commands"]["items"]["anyOf"] = planned.into();
     }
@@ -149,27 +149,26 @@ impl ToolSpec {
         schema
     }
 
-    /// Returns the strict schema with one relaxation: nullable fields are optional instead, and have their
-    /// defaults. It is for hosts that check arguments against the schema without insisting on strictness, for
-    /// example those of MCP.
+    /// Returns the strict schema with one relaxation: nullable fields are optional and have their defaults.
+    /// It is for hosts that check arguments against the schema but do not require strictness, for example MCP
+    /// hosts.
     pub fn lenient_schema(&self) -> Map<String, Value> {
         leaving_out(&self.with_defaults, true)
     }
 
-    /// Returns a strict schema for hosts that limit both how many fields of all tools may be left out and
-    /// how many may be of two types: the call's own fields may be null, those of the entries of its lists
-    /// may be left out.
+    /// Returns a strict schema for hosts that limit the numbers of optional and of nullable fields over all
+    /// tools. The call's own fields may be null; fields of list entries may be omitted.
     pub fn few_unions_schema(&self) -> Map<String, Value> {
         leaving_out(&self.input_schema, false)
     }
 
-    /// Returns the tool for the running episode `id`, for a caller that commands these `robots`.
+    /// Returns the tool for the running episode `id`, for a caller that commands `robots`.
     pub fn of_episode(self, id: &str, robots: &[String], most_steps: u32) -> EpisodeToolSpec {
         let mut body_schema = self.body_schema(most_steps);
         bound_robots(&mut body_schema, robots);
         make_readable(&mut body_schema);
         if let Value::Object(body) = &mut body_schema {
-            // The tool's own.
+            // This is the description of the tool.
             body.remove("description");
         }
         if let Some(properties) = body_schema["properties"].as_object_mut() {
@@ -185,7 +184,7 @@ impl ToolSpec {
     }
 }
 
-/// Returns the schema of the steps of a command with `until`.
+/// Returns the schema of `steps` of a command with `until`.
 fn long_steps() -> Value {
     json!({ "type": "integer", "minimum": 1, "maximum": SendPlan::MAX_UNTIL_STEPS })
 }

@@ -28,12 +28,12 @@ const DROPPED: &[&str] = &[
     "contains",
     "not",
     "allOf",
-    // Ours, for schemas of bodies.
+    // Our mark in schemas of bodies.
     "most_steps",
 ];
 
-/// Returns the description of `T` and its schema without it, with or without defaults, which strict hosts
-/// refuse.
+/// Returns the description of `T`, and its schema without the description. The schema has defaults if
+/// `defaults` is true; strict hosts refuse them.
 pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String, Map<String, Value>) {
     let mut schema = listed_schema::<T>(wording);
     if !defaults {
@@ -48,7 +48,7 @@ pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String
     (description, object)
 }
 
-/// The field that requests a short reply of any tool, and its text.
+/// Name and text of the field that requests a short reply from any tool.
 pub const SHORT: &str = "short";
 pub const SHORTLY: &str = "True: a shorter reply, without what is as expected.";
 
@@ -67,7 +67,7 @@ pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
     }
 }
 
-/// Adds the handle that is in the path over REST and among the arguments everywhere else.
+/// Adds the episode's handle. It is in the path over REST, and among the arguments otherwise.
 pub fn require_episode_id(schema: &mut Map<String, Value>) {
     let handle = json!({ "type": "string", "description": "The episode." });
     if let Some(Value::Object(properties)) = schema.get_mut("properties") {
@@ -115,16 +115,16 @@ fn make_strict(schema: &mut Value) {
     }
 }
 
-/// Joins the lines of descriptions, which break where the source does.
+/// Joins the lines of descriptions, which are broken like the source.
 pub fn unwrap_lines(object: &mut Map<String, Value>) {
     if let Some(Value::String(text)) = object.get_mut("description") {
         *text = text.replace("\n\n", "\u{1}").replace('\n', " ").replace('\u{1}', "\n\n");
     }
 }
 
-/// Replaces `oneOf`, which strict hosts refuse and which schemars writes for an enum with described variants.
-/// The names become an `enum`, and their descriptions part of the enum's description. Of any other `oneOf`
-/// only the texts remain.
+/// Replaces `oneOf`, which strict hosts refuse and schemars writes for an enum with described variants. The
+/// names become an `enum`, and their descriptions part of the enum's description. Of any other `oneOf`, only
+/// the texts are kept.
 pub fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;
@@ -145,7 +145,7 @@ pub fn list_choices(object: &mut Map<String, Value>) {
 }
 
 fn close_object(object: &mut Map<String, Value>) {
-    // A field that accepts any object stays so.
+    // A field that accepts any object remains unchanged.
     if object.get("additionalProperties") == Some(&Value::Bool(true)) {
         return;
     }

@@ -1,4 +1,4 @@
-//! Tools with their arguments and replies as named types, for clients in languages that have a class for each.
+//! Tools with named types of arguments and replies, for clients in languages that have a class for each type.
 
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value};
@@ -7,7 +7,7 @@ use super::plain::word;
 use crate::parts::{Assistance, Wording};
 use crate::tool::Tool;
 
-/// Every tool, and the types that their arguments and replies are made of.
+/// All tools, and the types of their arguments and replies.
 #[derive(Debug, Clone)]
 pub struct TypedTools {
     /// Tools in the order in which policies see them.
@@ -19,19 +19,19 @@ pub struct TypedTools {
 /// One tool.
 #[derive(Debug, Clone)]
 pub struct TypedTool {
-    /// The name a caller uses.
+    /// Name that callers use.
     pub name: &'static str,
-    /// JSON Schema of the arguments; the description is the tool's.
+    /// JSON Schema of the arguments. Its description is the tool's description.
     pub arguments: Value,
     /// The name of the reply's type.
     pub reply: String,
     /// True if the tool acts on an episode.
     pub on_episode: bool,
-    /// True if only operators that may talk to each other are offered it.
+    /// True if the tool is offered only to operators that may talk to each other.
     pub for_operators: bool,
 }
 
-/// Collects tools, and the types that they name.
+/// Collects tools and the types that they use.
 pub struct TypedToolsCollector {
     generator: SchemaGenerator,
     tools: Vec<TypedTool>,
@@ -49,12 +49,12 @@ impl TypedToolsCollector {
         self.tools.push(TypedTool { name: T::NAME, arguments, reply, on_episode, for_operators });
     }
 
-    /// Adds a type inside a reply that nevertheless has its own name.
+    /// Adds a named schema for a type inside a reply.
     pub fn add_type<T: JsonSchema>(&mut self) {
         self.generator.subschema_for::<T>();
     }
 
-    /// Returns the collected tools and types, in the words for full assistance.
+    /// Returns the collected tools and types, with the texts for full assistance.
     pub fn finish(mut self) -> TypedTools {
         let mut types = self.generator.take_definitions(true);
         let described = types.values_mut().chain(self.tools.iter_mut().map(|tool| &mut tool.arguments));

@@ -1,4 +1,4 @@
-//! `check_reach`: tests without moving whether the arms could reach a pose.
+//! `check_reach`: tests without motion whether the arms could reach poses.
 //! `episodes/src/commands/check_reach.rs` answers it.
 
 use schemars::JsonSchema;
@@ -9,8 +9,8 @@ use crate::limits;
 use crate::parts::PoseFrame;
 use crate::tool::Tool;
 
-/// Ask whether wrists could reach poses, as of move_wrists, from where the robot stands, by the waist and
-/// the arms that are given a pose. Nothing moves; costs no steps.
+/// Ask whether wrists could reach poses, as in move_wrists, from the robot's place, with the waist and the
+/// arms that are given a pose. Nothing moves; costs no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("allOf" = limits::at_least_one(&POSES)))]
 #[serde(deny_unknown_fields)]
@@ -31,12 +31,12 @@ pub struct CheckReach {
     /// Frame of the poses.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
-    /// True: with the waist as it is.
+    /// True: the waist stays fixed.
     #[schemars(extend("full_only" = true, "default" = false))]
     pub keep_waist: Option<bool>,
 }
 
-/// The fields of which at least one has to be given.
+/// Fields of which at least one is required.
 const POSES: [&str; 4] =
     ["left_position_m", "left_quaternion_wxyz", "right_position_m", "right_quaternion_wxyz"];
 
@@ -89,12 +89,11 @@ pub struct ReachReply {
     pub left: Option<HandReach>,
     /// Nearest approach of the right wrist; null if it was given no pose.
     pub right: Option<HandReach>,
-    /// True if the robot would most likely step to keep its balance under arms so far ahead: walk nearer
-    /// instead. Left out where it would not, and where the assistance is "paper".
+    /// True if the robot would probably step for balance with its arms so far ahead: walk nearer instead.
+    /// Left out otherwise, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "is_false")]
     pub needs_a_step: bool,
-    /// Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the
-    /// wrists from coming nearer.
+    /// Names of the waist and arm joints that would be at a limit, which keeps the wrists from coming nearer.
     pub joints_at_limit: Vec<String>,
 }
 
@@ -107,8 +106,8 @@ fn is_false(flag: &bool) -> bool {
 pub struct HandReach {
     /// True if it comes within 5 mm and 0.05 rad.
     pub reachable: bool,
-    /// Distance left, in metres.
+    /// Position error in metres.
     pub position_error_m: f64,
-    /// Angle left, in radians.
+    /// Angle error in radians.
     pub orientation_error_rad: f64,
 }

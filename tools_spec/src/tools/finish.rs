@@ -1,4 +1,4 @@
-//! `finish`: ends the episode and gives its result. `episodes/src/session/answer.rs` carries it out.
+//! `finish`: ends the episode and returns its result. `episodes/src/session/answer.rs` carries it out.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ impl Tool for Finish {
     }
 }
 
-/// Why an episode has ended.
+/// End of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EndReason {
@@ -39,12 +39,12 @@ pub enum EndReason {
     WallClockExhausted,
     /// `finish` was called, or the episode was deleted.
     Finished,
-    /// No call came for so long that the server took the policy for gone.
+    /// The policy made no call for too long.
     Abandoned,
-    /// The policy itself failed: its program or its server crashed, or was gone. Only `tandem evaluate`
-    /// ends episodes so.
+    /// The policy itself failed: its program or its server crashed or disappeared. Only `tandem evaluate`
+    /// uses this.
     PolicyFailed,
-    /// The simulator itself failed; the recording holds what went before.
+    /// The simulator itself failed; the recording has the steps before.
     SimulatorFailed,
 }
 
@@ -58,25 +58,25 @@ pub struct ResultReply {
     pub seed: Option<u32>,
     /// The rules that were in force.
     pub protocol: Protocol,
-    /// Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed.
+    /// Simulated seconds at which phases were reached; null for one not reached or not disclosed.
     pub phases: PhaseTimes,
     /// True if every phase was reached; left out where phases are not disclosed, and in results of earlier
     /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub success: Option<bool>,
-    /// Why the episode ended.
+    /// Cause of its end.
     pub ended: EndReason,
     /// Control steps of 20 ms, the initial hold included.
     pub env_steps: u32,
-    /// Calls of tools of all robots up to the end, reads, refused calls and the one that ended the episode
-    /// included. Each command of a plan or walk is one, and each slice of 5 steps with `until`.
+    /// Tool calls of all robots, including reads, refused calls and the one that ended the episode. Each
+    /// command of a plan or walk counts as one, and each slice of 5 steps with `until`.
     pub tool_calls: u32,
     /// Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each,
     /// counts once. Left out in results of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requests: Option<u32>,
-    /// Wall clock that the policy has thought between its calls, in seconds; where each robot has its own
-    /// operator, that of all operators together.
+    /// Wall-clock thinking time of the policy between its calls, in seconds; with one operator per robot, the
+    /// sum over all operators.
     #[serde(default)]
     pub thinking_s: f64,
     /// Use by each operator that has commanded, where each robot has its own; left out otherwise.
@@ -84,7 +84,7 @@ pub struct ResultReply {
     pub operators: Vec<OperatorUse>,
     /// Robots that fell.
     pub falls: u32,
-    /// Simulated seconds per second that the physics took.
+    /// Ratio of simulated time to physics wall clock.
     pub realtime_factor: f64,
     /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out for a
     /// policy whose assistance is "paper".
@@ -96,22 +96,22 @@ pub struct ResultReply {
     /// Amount of information that the policy got.
     #[serde(default)]
     pub assistance: Assistance,
-    /// Information that the policy got beyond the benchmark's own policies, for example "depth_images"; left
-    /// out where it was none.
+    /// Information that the policy got and the benchmark withholds, for example "depth_images"; left out
+    /// where there was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
-    /// Number of replies with each of it, by its name and by the robot it was of; left out where it was none,
-    /// and of a short reply.
+    /// Number of replies with each kind, by its name and robot; left out where there was none, and of a short
+    /// reply.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub extra_information_replies: BTreeMap<String, BTreeMap<String, u32>>,
-    /// Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved
-    /// there; left out where none did.
+    /// Share of the joint targets that exceeded joint limits by more than 0.01 rad and were clamped; left out
+    /// where none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints_clamped_share: Option<f64>,
     /// Departures from the benchmark, for example "assistance: full"; left out where there was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
-    /// Why the recording is not complete; left out where it is.
+    /// Cause of an incomplete recording; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
     /// Usage that notes on the episode report; left out where there are none.
@@ -120,8 +120,8 @@ pub struct ResultReply {
 }
 
 impl ResultReply {
-    /// Returns the result as a policy gets it at the end. Under "paper" it has neither seed nor hash, by which
-    /// it could find the episode among those that it has played before.
+    /// Returns the result as a policy gets it at the end. Under "paper", it contains neither seed nor hash,
+    /// by which the policy could recognize an episode that it has played before.
     pub fn disclosed(mut self, disclosure: Disclosure) -> ResultReply {
         match self.assistance {
             Assistance::Paper => (self.seed, self.state_hash) = (None, None),
@@ -136,7 +136,7 @@ impl ResultReply {
 }
 
 impl ResultReply {
-    /// Describes the end of language models' play, where the end of the episode does not say it.
+    /// Describes the ends of language models' play that the end of the episode does not imply.
     pub fn model_endings(&self) -> Option<String> {
         let endings = self.usage.iter().flat_map(Usage::own_endings);
         let words: Vec<String> = endings.map(ModelEnding::words).collect();
@@ -145,7 +145,7 @@ impl ResultReply {
 }
 
 impl Usage {
-    /// Adds the end of a model's play where the episode's end says it and no note does.
+    /// Adds the end of a model's play if the end of the episode implies it and no note reports it.
     pub fn ended_by(mut self, reason: EndReason) -> Usage {
         let ending = match reason {
             EndReason::TaskComplete => Some(AgentEnding::Success),
@@ -163,8 +163,7 @@ impl Usage {
     }
 }
 
-/// Seconds by the number of the phase, in the task's order; JSON object from `p1`, `p2`, ... to seconds or
-/// null.
+/// Seconds by phase number, in the task's order; a JSON object from `p1`, `p2`, ... to seconds or null.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
 

@@ -18,14 +18,14 @@ pub struct GetRobotState {
     /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Frame of the wrists; "room": and pelvis.
+    /// Frame of wrists; "room": also of pelvis.
     #[serde(default, skip_serializing_if = "PoseFrame::is_pelvis")]
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: PoseFrame,
 }
 
 impl GetRobotState {
-    /// Returns the call for `robot` with poses in its pelvis frame.
+    /// Returns the call for `robot`, with poses in the pelvis frame.
     pub fn of(robot: &str) -> GetRobotState {
         GetRobotState { robot: robot.into(), frame: PoseFrame::Pelvis }
     }
@@ -45,20 +45,21 @@ impl Tool for GetRobotState {
     }
 }
 
-/// The reply to `get_robot_state`. A short one has poses to the millimetre and to a thousandth.
+/// The reply to `get_robot_state`. A short one rounds poses to a millimetre and a thousandth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotState {
     /// The robot, for example "A".
     pub robot: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// The frame of the wrists where the call named another than that of the pelvis; left out otherwise.
+    /// Frame of the wrists, if the call named another than the pelvis; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// Joint angles in radians; left out of a short reply.
     #[serde(default, skip_serializing_if = "JointValues::is_empty")]
     pub joint_positions_rad: JointValues,
-    /// Joint velocities in radians per second; left out of a short reply, and where the assistance is "paper".
+    /// Joint velocities in radians per second; left out of a short reply, and where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_velocities_rad_s: Option<JointValues>,
     /// Joint torques in newton metres, as the drives apply them; left out of a short reply, and where the
@@ -70,9 +71,9 @@ pub struct RobotState {
     pub left_wrist: Pose,
     /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame.
     pub right_wrist: Pose,
-    /// Pose that the left wrist was commanded to, in the same frame, to be sent again to hold the hand: arms
-    /// sag, and one that is sent its measured pose again and again sinks. Left out where the arm keeps its
-    /// joints instead, and where the assistance is "paper".
+    /// Commanded pose of the left wrist in the same frame. Send it again to hold the hand: arms sag, and a
+    /// hand that is repeatedly sent its measured pose sinks. Left out where the arm keeps its joints instead,
+    /// and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_wrist_target: Option<Pose>,
     /// The same of the right wrist.
@@ -83,11 +84,11 @@ pub struct RobotState {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_in_pelvis: Option<[f64; 3]>,
     /// Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under
-    /// the pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the
-    /// way walked. Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
+    /// the pelvis at the start of the episode, z up, x along its heading. Drifts by up to 1 % of the distance
+    /// walked. Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
-    /// The same in the room frame, where the call named that; left out otherwise.
+    /// The same in the room frame, if the call named it; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_room: Option<Pose>,
     /// Base command in force; left out of a short reply where the robot stands as high as commanded.
@@ -97,13 +98,13 @@ pub struct RobotState {
     /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallen: Option<bool>,
-    /// Readings of its sensors in each physics step of the last control step, where the call asks for
+    /// Readings of its sensors in each physics step of the last control step, if the call requests
     /// `samples`; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SensorSamples>,
 }
 
-/// Readings of a robot's sensors every 5 ms. The last ones are those of the reply's `time_s`.
+/// Sensor readings of a robot every 5 ms. The last are at the reply's `time_s`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SensorSamples {
     /// Angles of the 43 joints in radians, in the order of `joint_positions_rad`.

@@ -43,22 +43,22 @@ pub struct StatusReply {
     pub time_s: f64,
     /// Control steps of 20 ms executed up to now, the initial hold included.
     pub env_steps: u32,
-    /// Why the episode has ended; null while it goes on.
+    /// Cause of the end; null while the episode runs.
     pub ended: Option<EndReason>,
     /// Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
     /// "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// Amount of information. With "paper", phases are disclosed once the episode has ended, which success
-    /// does not do by itself: call finish. With "full", the last phase ends the episode.
+    /// Amount of information. With "paper", phases are disclosed once the episode has ended; success does not
+    /// end it: call finish. With "full", the last phase ends the episode.
     pub assistance: Assistance,
-    /// Disclosure of phases, where it is not the assistance's; left out otherwise.
+    /// Disclosure of phases, if unlike the assistance's; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disclosure: Option<Disclosure>,
     /// Every phase reached up to now, where the assistance discloses it.
     pub phases: Vec<PhaseReached>,
-    /// The phase to reach next, and what it lacks; left out where the call did not ask for it, and where
-    /// phases are not disclosed.
+    /// The next phase and its unmet conditions; left out unless requested, and where phases are not
+    /// disclosed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next_phase: Option<NextPhase>,
     /// Remaining budget of the episode.

@@ -14,7 +14,7 @@ use crate::tool::{Route, Tool};
     fast and how low the robots can move."))]
 #[serde(deny_unknown_fields)]
 pub struct ListTasks {
-    /// True: only each task's id and instruction; start_episode tells the rest.
+    /// True: only each task's id and instruction; start_episode has the rest.
     #[serde(default)]
     pub short: bool,
 }
@@ -43,7 +43,7 @@ pub struct TaskList {
 }
 
 impl TaskList {
-    /// Returns the short list.
+    /// Returns the short form of the list.
     pub fn shortened(mut self) -> TaskList {
         for TaskInfo { id: _, suite: _, instruction: _, robots, phases, protocols } in &mut self.tasks {
             robots.clear();
@@ -59,8 +59,7 @@ impl TaskList {
 pub struct TaskInfo {
     /// Id for start_episode, for example `handover`.
     pub id: String,
-    /// The suite that it belongs to, for example `tandem+`; left out of the benchmark's tasks and of those of
-    /// files.
+    /// Its suite, for example `tandem+`; left out for tasks of the benchmark and from files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suite: Option<String>,
     /// Instruction for a policy of all robots.
@@ -82,7 +81,7 @@ pub struct TaskInfo {
 pub struct ProtocolInfo {
     /// The protocol.
     pub protocol: Protocol,
-    /// The most control steps of 20 ms that one command may ask for.
+    /// Maximum control steps of 20 ms per command.
     pub steps_per_command: u32,
     /// Control steps of an episode, the initial hold included.
     pub episode_steps: u32,
@@ -90,8 +89,8 @@ pub struct ProtocolInfo {
     pub initial_hold_steps: u32,
     /// Seconds that the policy may spend between calls; null for no limit.
     pub wall_clock_s: Option<f64>,
-    /// The seeds that results are reported on: the first.
+    /// First seed that results are reported on.
     pub first_seed: u32,
-    /// The seeds that results are reported on: the last.
+    /// Last seed that results are reported on.
     pub last_seed: u32,
 }

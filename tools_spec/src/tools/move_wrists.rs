@@ -1,5 +1,5 @@
-//! `move_wrists`: the command of agents that think in poses. `episodes/src/commands/move_wrists.rs` makes
-//! wrist and finger trajectories of it.
+//! `move_wrists`: the command for agents that specify wrist poses. `episodes/src/commands/move_wrists.rs`
+//! converts it to wrist and finger trajectories.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::limits;
 use crate::parts::{CommandReply, PoseFrame};
 use crate::tool::Tool;
 
-/// Softer hands would be thrown about by the forces that they sense of their own motion.
+/// Softer hands would be moved by the forces that they sense from their own motion.
 const MIN_COMPLIANCE_N_S_M: f64 = 50.0;
 const MIN_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
 
@@ -95,7 +95,7 @@ pub struct WristMove {
 }
 
 impl WristMove {
-    /// Returns a move of `robot` that keeps every target and does not walk.
+    /// Returns a move of `robot` that keeps all targets and does not walk.
     pub fn hold(robot: &str) -> WristMove {
         WristMove {
             robot: robot.into(),

@@ -24,7 +24,7 @@ pub struct Observe {
     /// True: without joint angles, velocities and torques, most of the text.
     #[schemars(extend("paper" = "True: without joint angles, most of the text.", "default" = false))]
     pub short: Option<bool>,
-    /// Frame of the wrists and, beside the pelvis frame, of the camera.
+    /// Frame of the wrists and of an additional camera pose.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
     /// True: also a grey image of depth.
@@ -34,7 +34,7 @@ pub struct Observe {
 }
 
 impl Observe {
-    /// Returns an observation of all robots, in full.
+    /// Returns a full observation of all robots.
     pub fn of_all() -> Observe {
         Observe { robots: None, short: None, frame: None, depth_image: false }
     }
@@ -66,30 +66,29 @@ impl Tool for Observe {
 pub struct Observation {
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// Proprioception, one entry per robot looked through.
+    /// Proprioception, one entry per observed robot.
     pub states: Vec<RobotState>,
-    /// Camera calibration, one entry per robot looked through.
+    /// Camera calibration, one entry per observed robot.
     pub cameras: Vec<CameraCalibration>,
-    /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
+    /// The images, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<CameraImage>,
-    /// Links to the pictures, in the order of `cameras`, where `images` was "link"; left out otherwise. Over
+    /// Links to the images, in the order of `cameras`, where `images` was "link"; left out otherwise. Over
     /// MCP they follow as links to resources, too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub links: Vec<ImageLink>,
-    /// Images of depth, in the same order, where `depth_image` was asked for; left out otherwise. Over MCP
-    /// they follow the pictures as image blocks.
+    /// Images of depth, in the same order, where `depth_image` was true; left out otherwise. Over MCP they
+    /// follow the images as image blocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub depth_images: Vec<DepthImage>,
-    /// Arrays that a program asked for beside PNGs or in place of them, one entry per robot; left out
-    /// otherwise.
+    /// Arrays requested by a program in addition to PNGs or instead, one entry per robot; left out otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arrays: Vec<CameraArrays>,
 }
 
 /// A pinhole camera: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v = fy y / z + cy.
-/// Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies at u =
-/// v = 0.
+/// Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre is at u = v =
+/// 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraCalibration {
     /// The robot whose head carries it.
@@ -116,8 +115,8 @@ pub struct CameraCalibration {
     pub distortion: Option<LensDistortion>,
 }
 
-/// Distortion of a lens after Brown and Conrady: in place of x / z and y / z come x' and y' as OpenCV's
-/// `projectPoints` makes them. Points of query_depth are right without further ado.
+/// Brown-Conrady distortion of a lens: OpenCV's `projectPoints` defines x' and y', which replace x / z and y
+/// / z. Points of query_depth need no correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LensDistortion {
     /// Name of the model: "brown_conrady".
@@ -126,21 +125,21 @@ pub struct LensDistortion {
     pub coefficients: [f64; 5],
 }
 
-/// One picture. In MessagePack, the file is called `png` and no base64.
+/// One image. In MessagePack, the field is `png` with raw bytes.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 pub struct CameraImage {
     /// The robot whose head camera took it.
     pub robot: String,
-    /// The picture.
+    /// The image.
     pub png_base64: Png,
 }
 
-/// Link to one picture.
+/// Link to one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageLink {
     /// The robot whose head camera took it.
     pub robot: String,
-    /// Path of the PNG file on this server, which gives it to who may play the episode. The latest 24 of an
+    /// Path of the PNG file on this server, for callers that may play the episode. The latest 24 of an
     /// episode are kept.
     pub path: String,
 }
@@ -155,16 +154,16 @@ impl Serialize for CameraImage {
     }
 }
 
-/// Depth of one picture as a grey image of the same size, for readers of images: its brightness is linear in
-/// 1 / depth. In MessagePack, the file is called `png` and no base64.
+/// Depth of one image as a grey image of the same size: its brightness is linear in 1 / depth. In
+/// MessagePack, the field is `png` with raw bytes.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 pub struct DepthImage {
     /// The robot whose head camera measured.
     pub robot: String,
-    /// Depth along the optical axis that is white (255), in metres; what is nearer is white, too.
+    /// Depth along the optical axis that is white (255), in metres; nearer points are white, too.
     pub white_m: f64,
-    /// Depth that is black (0); so is what is further, and where nothing is. Grey g is at the depth
-    /// 1 / (1 / black_m + g / 255 (1 / white_m - 1 / black_m)).
+    /// Depth that is black (0), like farther or missing points. Grey g is at the depth 1 / (1 / black_m + g /
+    /// 255 (1 / white_m - 1 / black_m)).
     pub black_m: f64,
     /// The image.
     pub png_base64: Png,

@@ -28,7 +28,7 @@ pub struct QueryDepth {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub fit: bool,
-    /// Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
+    /// Middle, size, corners and, for an upright round object, axis of a surface in place of points.
     #[schemars(extend("full_only" = true))]
     pub surface: Option<SurfaceQuery>,
     /// Frame of the points.
@@ -38,7 +38,7 @@ pub struct QueryDepth {
 }
 
 impl QueryDepth {
-    /// Returns every pixel that a call names which has been checked.
+    /// Returns every pixel that the call names. The call must have been checked.
     pub fn named(&self) -> Vec<[i64; 2]> {
         let region = self.region.iter().flat_map(PixelRegion::pixels);
         self.pixels.iter().flatten().copied().chain(region).collect()
@@ -97,7 +97,7 @@ pub struct SurfaceQuery {
 }
 
 impl SurfaceQuery {
-    /// Name that stands for every object of the task.
+    /// Name for every object of the task.
     pub const ALL: &str = "all";
 
     fn validate(&self) -> Result<(), String> {
@@ -156,24 +156,23 @@ impl JsonSchema for Color {
     }
 }
 
-/// By what pixels are joined to a surface. Neighbours are of about the same depth, except of an object.
+/// Criterion that joins pixels to a surface. Neighbours have about the same depth, except for `object`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JoinedBy {
-    /// By like colour; of a colour that was asked for, all of it on one thing.
+    /// Similar colour; for a requested colour, all of it on one object.
     Color,
-    /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a
-    /// thing stands on a table.
+    /// Shape, regardless of colour: across convex edges but not concave ones, such as between an object and
+    /// its table.
     Shape,
-    /// By the object that was named, whatever its colours and whatever hides parts of it. The simulator
-    /// knows which pixels see it.
+    /// The named object, regardless of colours and occlusion. The simulator knows its pixels.
     Object,
 }
 
-/// The axis of a thing that is upright and round, as a bottle.
+/// Axis of an upright round object, such as a bottle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct UprightAxis {
-    /// Its lower end as far as that is seen, [x, y, z] in metres in the frame of the reply.
+    /// Its lower visible end, [x, y, z] in metres in the frame of the reply.
     pub bottom_m: [f64; 3],
     /// Its upper end.
     pub top_m: [f64; 3],
@@ -181,36 +180,36 @@ pub struct UprightAxis {
     pub radius_m: f64,
 }
 
-/// A surface as the camera sees it: only what is in view, and of a thing only its near side.
+/// The visible part of a surface; of an object only its near side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Surface {
-    /// The object, where the call asked for all; left out otherwise.
+    /// The object, if the call named "all"; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
-    /// By what its pixels are joined.
+    /// Criterion for its pixels.
     pub joined_by: JoinedBy,
     /// Number of its pixels.
     pub pixels: u32,
-    /// Its top left and bottom right in the picture, as [u, v].
+    /// Top left of its bounding box, as [u, v].
     pub from: [i64; 2],
-    /// See `from`.
+    /// Bottom right.
     pub to: [i64; 2],
     /// Its mean colour, [red, green, blue] from 0 to 255.
     pub rgb: [u8; 3],
     /// The middle of its area, in metres in the frame of the reply.
     pub centroid_m: [f64; 3],
-    /// The middle of its box along the axes of that frame: of a thing that is seen whole, its own.
+    /// Middle of its box along that frame's axes: the object's own if it is fully visible.
     pub middle_m: [f64; 3],
     /// Size of that box along each axis, in metres.
     pub extent_m: [f64; 3],
-    /// The four points of its outline that span the most of it in the picture, in the order of its outline:
-    /// of a rectangle its corners. Left out of a short reply where there is an axis, and of all objects.
+    /// The four points of its outline that span the largest area in the picture, in the order of the outline:
+    /// a rectangle's corners. Left out of a short reply with an axis, and for "all".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub corners_m: Vec<[f64; 3]>,
     /// Its axis, where it is upright and round; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<UprightAxis>,
-    /// True if it goes on beyond the image.
+    /// True if it extends beyond the image.
     pub cut_off: bool,
 }
 
@@ -219,24 +218,24 @@ pub struct Surface {
 pub struct PlaneFit {
     /// The middle of its points, in metres in the frame of the reply.
     pub point_m: [f64; 3],
-    /// Unit vector at right angles to it, towards the camera, in that frame.
+    /// Unit normal towards the camera, in that frame.
     pub normal: [f64; 3],
-    /// Root mean square of how far its points are off it, in metres.
+    /// Root mean square distance of its points, in metres.
     pub rms_m: f64,
     /// Number of the region's pixels that see it.
     pub pixels: u32,
-    /// Their share of those that see anything.
+    /// Their share of the pixels with depth.
     pub share: f64,
 }
 
 /// A straight edge at which the plane ends within the region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EdgeFit {
-    /// One end of what is seen of it, in metres in the frame of the reply.
+    /// One end of its visible part, in metres in the frame of the reply.
     pub from_m: [f64; 3],
     /// The other end.
     pub to_m: [f64; 3],
-    /// Root mean square of how far its points are off it, in metres.
+    /// Root mean square distance of its points, in metres.
     pub rms_m: f64,
     /// Number of points that it was fitted to.
     pub points: u32,
@@ -247,9 +246,9 @@ pub struct EdgeFit {
 pub struct RegionFit {
     /// The largest plane.
     pub plane: PlaneFit,
-    /// Its straight edges, the longest first, up to four. An edge may be where something hides the plane.
+    /// Its straight edges, the longest first, up to four. An edge may be due to occlusion.
     pub edges: Vec<EdgeFit>,
-    /// Corners, where two of them meet, in metres in the frame of the reply.
+    /// Corners at which two edges meet, in metres in the frame of the reply.
     pub corners_m: Vec<[f64; 3]>,
 }
 
@@ -258,29 +257,28 @@ pub struct RegionFit {
 pub struct DepthReply {
     /// The robot whose camera measured.
     pub robot: String,
-    /// The frame of the points, where the call named another than that of the pelvis; left out otherwise.
+    /// Frame of the points, if the call named another than the pelvis; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
-    /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole
-    /// thing; of a colour up to three, the nearest first and what is of the room last; of an object one; of all
-    /// one for each that is seen.
-    /// Left out where none was asked for.
+    /// The surfaces found: at a pixel, the patch of its colour and, if larger, the whole object; for a colour
+    /// up to three, the nearest first and parts of the room last; for an object one; for "all" one for each
+    /// visible object. Left out where none was requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
-    /// Plane, edges and corners of the region; left out where `fit` was not asked for.
+    /// Plane, edges and corners of the region; left out unless `fit` was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<RegionFit>,
     /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply without points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
-    /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where
-    /// nothing is seen, or the camera has no depth. Left out with surfaces or a fit.
+    /// One row per requested pixel, in order; a region's row by row. Rounded to 1 mm; null where nothing is
+    /// seen, or the camera has no depth. Left out with surfaces or a fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<DepthRow>,
 }
 
 impl DepthReply {
-    /// The columns.
+    /// Names of the columns.
     pub const COLUMNS: [&str; 5] = ["u", "v", "x_m", "y_m", "z_m"];
 }
 
@@ -340,7 +338,7 @@ mod tests {
         }
     }
 
-    /// Recordings and schemas of before have null.
+    /// Earlier recordings and schemas have null.
     #[test]
     fn a_frame_of_null_is_the_pelvis() {
         let pixel = json!([[160, 120]]);

@@ -1,5 +1,5 @@
-//! `say`: messages between the operators of an episode, offered only if the episode was started with them.
-//! `gateway/src/hosting/team/` delivers them.
+//! `say`: messages between the operators of an episode, offered only if the episode was started with
+//! messages. `gateway/src/hosting/team/` delivers them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

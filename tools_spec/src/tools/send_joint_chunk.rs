@@ -9,11 +9,11 @@ use crate::limits;
 use crate::parts::{BASE_COLUMNS, CommandReply};
 use crate::tool::Tool;
 
-/// Numbers in a row: 31 joint targets and the base command.
+/// Number of values in a row: 31 joint targets and the base command.
 pub const ACTION_ROW_LEN: usize = 35;
 
-/// The blocks of joints that a row begins with, in order, with the number of columns of each. Within a
-/// hand: thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
+/// The blocks of joints at the beginning of a row, in order, with their numbers of columns. Within a hand:
+/// thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
 const JOINT_BLOCKS: [(&str, usize); 5] =
     [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 
@@ -81,7 +81,7 @@ impl Tool for SendJointChunk {
         self.robots.iter().map(|entry| entry.robot.as_str()).collect()
     }
 
-    /// Returns one a row; every robot has as many.
+    /// Returns one step per row. All robots have the same number of rows.
     fn steps(&self) -> u32 {
         checks::row_steps(self.robots.first().map(|entry| &entry.rows))
     }

@@ -10,12 +10,12 @@ use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
-/// The blocks of a row of setpoints, in order, each with a number for each joint.
+/// The blocks of a row of setpoints, in order. Each has one number for each joint.
 pub const DRIVE_BLOCKS: [&str; 5] =
     ["position_rad", "velocity_rad_s", "kp_n_m_rad", "kd_n_m_s_rad", "torque_n_m"];
-/// Numbers in a block: the 43 joints, in the order of `get_robot_state`.
+/// Number of values in a block: the 43 joints, in the order of `get_robot_state`.
 const DRIVE_JOINTS: usize = 43;
-/// Numbers in a row of setpoints.
+/// Number of values in a row of setpoints.
 pub const DRIVE_ROW_LEN: usize = DRIVE_BLOCKS.len() * DRIVE_JOINTS;
 /// Physics steps of 5 ms in a control step.
 const PHYSICS_STEPS: usize = 4;
@@ -98,7 +98,7 @@ impl Tool for SendJointDrives {
         self.robots.iter().map(|entry| entry.robot.as_str()).collect()
     }
 
-    /// Returns one a row; every robot has as many.
+    /// Returns one step per row. All robots have the same number of rows.
     fn steps(&self) -> u32 {
         checks::row_steps(self.robots.first().map(|entry| &entry.rows))
     }

@@ -9,7 +9,7 @@ use crate::parts::PlanReply;
 use crate::tool::Tool;
 use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk, WalkTo};
 
-/// Commands of one plan.
+/// Maximum number of commands in one plan.
 const MAX_COMMANDS: usize = 20;
 
 /// Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold.
@@ -40,8 +40,8 @@ pub struct PlannedCommand {
     /// Conditions after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
-    /// True: it ends once its `expects` hold, with `arrived`, or `holding` of fingers that move, not before all
-    /// `steps`; else the plan stops then, up to 1500. For move_wrists, walk, wait.
+    /// True: it ends once its `expects` hold, with `arrived`, or `holding` of fingers that move, not before
+    /// all `steps`; else the plan stops then, up to 1500. For move_wrists, walk, wait.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("default" = false))]
     pub until: bool,
@@ -105,12 +105,12 @@ impl Expectation {
         named.or_else(|| self.any_of.iter().flatten().find_map(Expectation::names_partners))
     }
 
-    /// Returns true where no condition is given.
+    /// Returns true if there is no condition.
     pub fn is_empty(&self) -> bool {
         *self == Expectation::default()
     }
 
-    /// Returns these conditions and all that `any_of` holds.
+    /// Returns these conditions and all conditions in `any_of`.
     pub fn with_alternatives(&self) -> Vec<&Expectation> {
         let inner = self.any_of.iter().flatten().flat_map(Expectation::with_alternatives);
         [self].into_iter().chain(inner).collect()
@@ -134,15 +134,15 @@ impl Expectation {
 }
 
 impl SendPlan {
-    /// Tools that a plan may name: every command, and walks to a place.
+    /// Tools that a plan may contain: commands, and walks to a place.
     pub const COMMANDS: [&str; 5] =
         [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME, WalkTo::NAME];
     /// Commands that may continue until a condition holds.
     pub const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
-    /// Maximum number of control steps of a command with `until`: that of a walk, half a minute.
+    /// Maximum number of control steps of a command with `until`, the same as for a walk: half a minute.
     pub const MAX_UNTIL_STEPS: u32 = 1500;
 
-    /// Returns what messages call the command at `index`.
+    /// Returns the name of the command at `index` in messages.
     pub fn place(&self, index: usize) -> String {
         format!("command {} of {}", index + 1, self.commands.len())
     }
@@ -152,7 +152,7 @@ impl Tool for SendPlan {
     type Reply = PlanReply;
     const NAME: &'static str = "send_plan";
     const READ_ONLY: bool = false;
-    /// Whatever tool a command names, its arguments are an object that its own schema describes.
+    /// The arguments of a command are an object that the schema of the command's tool describes.
     const STRICT: bool = false;
     const FULL_ONLY: bool = true;
 

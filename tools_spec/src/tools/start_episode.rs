@@ -43,11 +43,11 @@ impl Tool for StartEpisode {
 /// The reply to `start_episode`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StartReply {
-    /// The handle that every other tool needs.
+    /// Handle that every other tool needs.
     pub episode_id: String,
-    /// An episode to which no call comes for as many seconds ends.
+    /// Seconds without a call after which the episode ends.
     pub idle_limit_s: u64,
-    /// Credentials of each robot's operator, where each has one of its own; left out otherwise.
+    /// Credentials of each robot's operator; left out if one policy directs all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub operators: Vec<OperatorToken>,
     /// The briefing.
@@ -60,20 +60,20 @@ pub struct StartReply {
 pub struct Briefing {
     /// Instruction for all robots.
     pub instruction: String,
-    /// Instruction for those who direct one robot each, where `instruction` says more than all of them may
-    /// know; left out otherwise.
+    /// Instruction for operators of one robot each, if `instruction` says more than all may know; left out
+    /// otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared_instruction: Option<String>,
     /// Instruction for each robot.
     pub instructions: Vec<Instruction>,
     /// The robots.
     pub robots: Vec<RobotInfo>,
-    /// The phases of the task, in the order they have to be reached; left out where the assistance is "paper".
+    /// The phases of the task, in the order they have to be reached; left out where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
-    /// The things of the task: how large they are, along the first robot's axes, and how far from each
-    /// robot they stand before the seed moves them by a decimetre or so. Left out where the assistance is
-    /// "paper".
+    /// The task's objects: their sizes along the first robot's axes, and their distances from each robot
+    /// before the seed moves them by about a decimetre. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room: Vec<String>,
     /// Ways in which the episode ends, and disclosure of phases.
@@ -90,13 +90,13 @@ pub struct Briefing {
     pub action_row: Vec<String>,
     /// Status of the episode after the initial hold.
     pub status: StatusReply,
-    /// Why the recording is not complete; left out where it is.
+    /// Cause of an incomplete recording; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
 }
 
 impl Briefing {
-    /// Returns the briefing for the operator of this robot alone.
+    /// Returns the briefing for the operator of one robot.
     pub fn for_robot(mut self, robot: &str) -> Briefing {
         self.instructions.retain(|entry| entry.robot == robot);
         self.status.fallen.retain(|entry| entry.robot == robot);
@@ -116,7 +116,7 @@ impl Briefing {
         Briefing { http: vec![list, call, short.into()], ..self }
     }
 
-    /// Returns the short briefing.
+    /// Returns the short form of the briefing.
     pub fn shortened(mut self) -> Briefing {
         self.action_row.clear();
         self.status.fallen.retain(|entry| entry.fallen);
@@ -133,7 +133,7 @@ pub struct PhaseInfo {
     pub id: String,
     /// `p1`, `p2`, ...
     pub number: String,
-    /// When the phase counts as reached.
+    /// Condition for reaching the phase.
     pub description: String,
     /// True if more than one robot has to work on it.
     pub collaborative: bool,
@@ -179,14 +179,14 @@ pub struct JointInfo {
     pub lower_rad: f64,
     /// Upper limit in radians.
     pub upper_rad: f64,
-    /// The largest torque that its drive exerts, in newton metres.
+    /// Maximum torque of its drive, in newton metres.
     pub effort_n_m: f64,
 }
 
 /// Facts about the robots for seeing and acting, in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Brief {
-    /// The frames that poses are given in.
+    /// Frames of poses.
     pub frames: String,
     /// Relation of the frames of different robots.
     pub partners: String,
@@ -206,13 +206,13 @@ pub struct Brief {
     /// Grasping; left out where the server gives no hints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grasping: Option<String>,
-    /// Grips that work, as `grasping` says how to use them; left out where the server gives no hints.
+    /// Working grips, explained in `grasping`; left out where the server gives no hints.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub grips: Vec<WorkedGrip>,
 }
 
 impl Brief {
-    /// Returns all of it, a line each.
+    /// Returns all facts, a line each.
     pub fn lines(&self) -> Vec<String> {
         let Brief { frames, partners, teamwork, odometry, camera, hands, walking, grasping, grips } = self;
         let told = [frames, partners]
@@ -226,12 +226,12 @@ impl Brief {
     }
 }
 
-/// A grip that works, of a right hand whose robot faces the thing squarely.
+/// A working grip of a right hand whose robot squarely faces the object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorkedGrip {
-    /// Things that it suits.
+    /// Suitable objects.
     pub thing: String,
-    /// Point of the thing that `place_m` is.
+    /// Point of the object at `place_m`.
     pub place: String,
     /// Orientation of the right wrist, in the level frame.
     pub right_quaternion_wxyz: [f64; 4],
@@ -239,17 +239,17 @@ pub struct WorkedGrip {
     pub left_quaternion_wxyz: [f64; 4],
     /// Place of that point in the right wrist's frame while the hand holds it; negate y for a left hand.
     pub place_m: [f64; 3],
-    /// Stops of the hand on its way in, the farthest first: offsets from `place_m`.
+    /// Waypoints of the hand's approach, farthest first: offsets from `place_m`.
     pub stops_m: Vec<[f64; 3]>,
-    /// Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all
-    /// but the first.
+    /// Right finger angles for approach and retreat, as in right_fingers_rad; a left hand negates all but the
+    /// first.
     pub open_rad: [f64; 7],
     /// Finger angles of a right hand that holds.
     pub close_rad: [f64; 7],
     /// Distance of the pelvis behind the places of its hands; left out where that does not matter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stand_behind_m: Option<f64>,
-    /// Pelvis height at which hands come there; left out where the robot stands upright.
+    /// Pelvis height for the grip; left out where the robot stands upright.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_height_m: Option<f64>,
 }

@@ -9,7 +9,7 @@ use crate::limits;
 use crate::parts::{PlanReply, PoseFrame};
 use crate::tool::Tool;
 
-/// Maximum number of control steps of one call: thirty seconds.
+/// Maximum number of control steps of one call: half a minute.
 const MAX_STEPS: u32 = 1500;
 /// Maximum number of waypoints of a robot.
 const MAX_WAYPOINTS: usize = 10;

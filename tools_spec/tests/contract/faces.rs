@@ -1,9 +1,9 @@
-//! Forms of the contract: strict and lenient, of any episode and of a running one.
+//! Forms of the contract: strict and lenient, for any episode and for a running episode.
 
 use serde_json::{Map, Value, json};
 use tandem_tools_spec::{Format, Hints, ToolSpec, Wording, episode_tool_specs, openapi, tool_specs};
 
-/// Returns all texts about the tools that a policy reads, form by form.
+/// Returns all texts about tools that a policy reads, one for each form.
 fn faces(hints: Hints) -> Vec<String> {
     let specs = tool_specs(hints);
     let mut faces = vec![
@@ -14,11 +14,11 @@ fn faces(hints: Hints) -> Vec<String> {
     for format in Format::ALL {
         faces.push(specs.iter().map(|spec| spec.formatted(format)).collect());
     }
-    // Texts of OpenAPI break their lines where the source does.
+    // Texts in OpenAPI break their lines like the source.
     faces.iter().map(|face| face.to_string().replace("\\n", " ")).collect()
 }
 
-/// Recipes for grasping are in the brief, which is read once.
+/// Recipes for grasping are only in the briefing, which is read once.
 #[test]
 fn every_face_tells_the_hands_geometry_and_no_recipe() {
     const GEOMETRY: [&str; 3] =
@@ -32,7 +32,7 @@ fn every_face_tells_the_hands_geometry_and_no_recipe() {
     assert_eq!(faces(Hints::On), faces(Hints::Off), "hints are of the brief alone");
 }
 
-/// One policy of all robots has no partners to hear.
+/// A policy that directs all robots has no partners that could send messages.
 #[test]
 fn lists_have_what_is_for_operators_for_operators_alone() {
     let list = |wording: Wording| {
@@ -77,7 +77,7 @@ fn for_each_object(value: &Value, visit: &mut impl FnMut(&Map<String, Value>)) {
     }
 }
 
-/// Counts the fields of all tools that may be left out, and those with a choice of types.
+/// Counts the optional fields of all tools, and the fields with a choice of types.
 fn optional_and_unions(tools: &Value) -> (usize, usize) {
     let (mut optional, mut unions) = (0, 0);
     for_each_object(tools, &mut |object| {
@@ -92,7 +92,7 @@ fn optional_and_unions(tools: &Value) -> (usize, usize) {
 }
 
 /// https://platform.claude.com/docs/en/build-with-claude/structured-outputs: at most 20 strict tools, 24
-/// fields that may be left out and 16 that have a union of types, over all tools of a request.
+/// optional fields and 16 fields with a union of types, over all tools of a request.
 #[test]
 fn anthropic_takes_all_tools_at_once() {
     let specs = tool_specs(Hints::On).into_iter().filter(|spec| spec.strict);
@@ -125,7 +125,7 @@ fn every_format_has_the_tools_under_their_names() {
             let tool = spec.formatted(format);
             let tool = if format == Format::OpenAiChat { &tool["function"] } else { &tool };
             assert_eq!(tool["name"], spec.name, "{format:?}");
-            // What OpenAI accepts at most.
+            // Maximum length that OpenAI accepts.
             assert!(tool["description"].as_str().is_some_and(|text| text.len() <= 1024), "{tool}");
         }
     }
@@ -180,7 +180,7 @@ fn what_may_be_left_out_has_its_default() {
     }
 }
 
-/// A team that carries passes its waypoints together.
+/// Robots that carry together pass their waypoints together.
 #[test]
 fn robots_that_carry_have_as_many_waypoints_as_each_other() {
     let call = |carry: bool, counts: [usize; 2]| {
@@ -197,7 +197,8 @@ fn robots_that_carry_have_as_many_waypoints_as_each_other() {
     assert!(call(false, [11, 0]).is_some_and(|refusal| refusal.contains("10 at most")));
 }
 
-/// Example arguments for a caller fit its schema. They name the episode if the schema does, and have no null.
+/// Example arguments fit the schema that their caller sees. They name the episode if the schema does, and
+/// contain no null.
 #[test]
 fn examples_fit_the_schemas() {
     for name in ["check_reach", "move_wrists", "query_depth", "walk_to", "observe"] {
@@ -244,7 +245,7 @@ fn a_running_episode_says_how_many_steps_a_command_may_have() {
     assert!(specs.iter().all(|tool| tool.name != "list_tasks"));
 }
 
-/// A model reads the list of its episode once; validators have OpenAPI.
+/// A model reads the list of its episode's tools once; validators use OpenAPI.
 #[test]
 fn the_list_of_an_episode_is_for_a_reader() {
     let specs = episode_tool_specs(Hints::On, "handover-seed0", &["B".into()], 25, true);

@@ -1,13 +1,13 @@
-//! Golden files of the contract as its callers see it: a change of the contract shows as a change of a file.
+//! Golden files of the contract as its callers see it. A change of the contract shows as a change of a file.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract goldens` writes them anew.
+//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract goldens` rewrites them.
 
 use std::{env, fs, path::Path};
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{Assistance, Format, Hints, ToolSpec, openapi, tool_specs};
 
-/// Compares `face` with the file `name`, or writes the file.
+/// Compares `face` with the file `name`, or rewrites the file.
 fn check(name: &str, face: &Value) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(format!("{name}.json"));
     let text = serde_json::to_string_pretty(face).expect("JSON") + "\n";
@@ -32,12 +32,12 @@ fn tools_in_every_format() {
     }
 }
 
-/// Returns the tools of `other` that differ from those of `one`.
+/// Returns the tools of `other` that are not equal to any tool of `one`.
 fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
     other.into_iter().filter(|other| !one.contains(other)).map(|other| json!(other)).collect()
 }
 
-/// Texts under `paper` differ.
+/// Some tools have different texts under `paper`.
 #[test]
 fn tools_of_paper() {
     check("paper", &differing(tool_specs(Hints::Off), tool_specs(Assistance::Paper)));

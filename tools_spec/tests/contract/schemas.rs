@@ -1,4 +1,4 @@
-//! The contract as its two readers see it: strict hosts read the schemas, policies read the refusals.
+//! The contract for its two kinds of readers: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{
@@ -25,7 +25,7 @@ const REFUSED_KEYWORDS: &[&str] = &[
     "oneOf",
 ];
 
-/// Walks every object schema below `schema`, the schema itself included.
+/// Calls `visit` with `schema` and every object schema below it.
 fn for_each_schema(schema: &Value, visit: &mut impl FnMut(&Value)) {
     visit(schema);
     for property in schema["properties"].as_object().into_iter().flat_map(|object| object.values()) {
@@ -122,7 +122,7 @@ fn nullable_fields_may_be_left_out() {
     assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
-/// Checks that a refusal contains every one of `says`.
+/// Checks that a refusal contains every text in `says`.
 fn refused(name: &str, args: Value, says: &[&str]) {
     let text = match ToolCall::parse(name, args.clone()) {
         Ok(call) => panic!("{name} {args} was accepted: {call:?}"),
@@ -341,7 +341,7 @@ fn openapi_says_what_is_refused() {
     assert_eq!(says[1]["required"], json!(["tokens"]));
 }
 
-/// With `until` a command of a plan may have more steps than alone.
+/// With `until`, a command of a plan may have more steps than outside a plan.
 #[test]
 fn openapi_says_how_many_steps_a_planned_command_may_have() {
     let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
@@ -382,7 +382,7 @@ fn joint_values_keep_their_order_and_four_decimals() {
     assert_eq!((read.get("waist"), read.get("knee")), (Some(0.64), None));
 }
 
-/// An episode of two robots has no third.
+/// An episode with two robots has no third robot.
 #[test]
 fn bodies_of_an_episode_name_its_own_robots() {
     let robots = ["A".to_owned(), "B".to_owned()];
@@ -403,7 +403,7 @@ fn bodies_of_an_episode_name_its_own_robots() {
     }
 }
 
-/// Fields for operators need operators, and the body's schema says so.
+/// Fields about operators require operators, as the body's schema states.
 #[test]
 fn a_start_says_what_only_operators_can_have() {
     let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);

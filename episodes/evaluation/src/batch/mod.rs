@@ -1,5 +1,5 @@
-//! Batches for learners: worlds of one task that step together, one call for all, with numbers in and
-//! numbers out.
+//! Batches for learners: worlds of one task that step together in one call, with numeric arrays as inputs and
+//! outputs.
 
 mod parallel;
 mod world;
@@ -23,7 +23,7 @@ use world::{BatchWorld, SeenStep, SeenWorld};
 /// Default size of an image from a robot's own camera.
 pub const PICTURE_PX: [u32; 2] = [320, 240];
 
-/// Reason why a batch takes no step.
+/// Reason why a batch cannot reset or step.
 #[derive(Debug, thiserror::Error)]
 pub enum BatchError {
     #[error("world {world} has no episode under way; reset it first")]
@@ -45,7 +45,7 @@ pub struct BatchSpec {
     /// Number of threads that step the worlds.
     pub threads: usize,
     pub actions: ActionKind,
-    /// Number of control steps in which robots carry out a row.
+    /// Number of control steps in which robots carry out one row.
     pub steps_per_row: u32,
     pub reward: RewardKind,
     /// Width and height of each robot's camera image; `None` for no images.
@@ -54,12 +54,12 @@ pub struct BatchSpec {
     pub record: Option<PathBuf>,
 }
 
-/// Start of the next episode in a world whose last one is over.
+/// Time at which a world whose episode is over begins its next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Autoreset {
-    /// The next episode begins in place of the step after the last.
+    /// The next episode begins in place of the step that follows the final one.
     NextStep,
-    /// The next episode begins in the last step itself.
+    /// The next episode begins in the same step in which the last one ends.
     SameStep,
     /// An episode begins only when the world is reset.
     Disabled,
@@ -82,14 +82,14 @@ impl Autoreset {
 pub struct SeenArrays<'a> {
     /// [`STATE_COLUMNS`] numbers for each robot.
     pub state_rows: &'a mut [f32],
-    /// Height by width by red, green, blue for each robot; empty for no images.
+    /// RGB images (height, width, channel), one for each robot; empty for no images.
     pub pictures: &'a mut [u8],
 }
 
 /// A step of a batch: one row for each robot.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchStep<'a> {
-    /// World after world, robot after robot, columns of the action.
+    /// Action columns, by robot within each world.
     pub action_rows: &'a [f32],
     pub autoreset: Autoreset,
     /// True if the policy observes this step. Images of other steps are rendered only where an episode
@@ -119,8 +119,9 @@ impl Batch {
         &self.spec
     }
 
-    /// Begins an episode in each world that has an entry: with the given seed, or with that of the world's
-    /// next round. The episodes of a round do not depend on how many began automatically in the last one.
+    /// Begins an episode in each world that has an entry. It has the given seed, or else the seed of the
+    /// world's next round. The episodes of a round do not depend on how many began automatically in the last
+    /// one.
     ///
     /// # Errors
     ///
@@ -136,13 +137,13 @@ impl Batch {
         outcomes.into_iter().map(Option::transpose).collect()
     }
 
-    /// Executes a row of each robot in each world, or begins the world's next episode. `last` receives the
+    /// Executes one row for each robot in each world, or begins the world's next episode. `last` receives the
     /// final observation of an episode if the next one begins in the same step. If any action is invalid, no
     /// world steps.
     ///
     /// # Errors
     ///
-    /// If an action is invalid, or a world has no episode under way.
+    /// If an action is invalid, or a world has no episode in progress.
     pub fn step(
         &mut self,
         step: BatchStep,
@@ -190,7 +191,7 @@ impl Batch {
         steps.into_iter().zip(places).map(write).collect()
     }
 
-    /// Renders the images of all worlds that have deferred them, together.
+    /// Renders all images that worlds have deferred, together.
     fn draw_undrawn(&self, steps: &mut Steps) {
         let Some(size_px) = self.spec.pictures_px else { return };
         let mut worlds: Vec<_> = self.worlds.iter().map(held).collect();
@@ -212,7 +213,7 @@ impl Batch {
         }
     }
 
-    /// Returns the checked call of each world.
+    /// Checks the step and returns the call for each world.
     fn calls(&self, step: &BatchStep) -> Result<Vec<ToolCall>, BatchError> {
         if let Some(world) = self.worlds.iter().position(|world| !held(world).takes(step.autoreset)) {
             return Err(BatchError::NotBegun { world });
@@ -229,11 +230,11 @@ impl Batch {
         asked.collect()
     }
 
-    /// Renders the images of a world's robots in this size.
+    /// Renders the camera images of a world's robots in this size.
     ///
     /// # Errors
     ///
-    /// If there is no such world, or it has no episode under way.
+    /// If there is no such world, or it has no episode in progress.
     pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
         self.ask(world, |session| {
             let robots = session.spec().task.robots.len();
@@ -245,7 +246,7 @@ impl Batch {
     ///
     /// # Errors
     ///
-    /// If there is no such world, or it has no episode under way.
+    /// If there is no such world, or it has no episode in progress.
     pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
         self.ask(world, |session| session.state_hash())
     }
@@ -257,14 +258,14 @@ impl Batch {
     }
 }
 
-/// Closes all recordings, so that they are whole even if their episodes are not played to the end.
+/// Closes all recordings, so that they are complete even if their episodes were not played to the end.
 impl Drop for Batch {
     fn drop(&mut self) {
         self.worlds.iter().for_each(|world| held(world).close());
     }
 }
 
-/// Locks a world. A world that has panicked has no session, see [`BatchWorld::session`].
+/// Locks a world. A world that has panicked has no session; see [`BatchWorld::session`].
 fn held(world: &Mutex<BatchWorld>) -> MutexGuard<'_, BatchWorld> {
     world.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvError, Sender, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Time for which an idle thread polls for work before it sleeps. Waking a thread takes a tenth of a
+/// Time for which an idle thread polls for work before it blocks. Waking a blocked thread takes a tenth of a
 /// world's step, and the caller requests the next step soon after the last.
 const AWAKE: Duration = Duration::from_micros(200);
 
@@ -17,11 +17,12 @@ pub struct Threads {
     helpers: Vec<Sender<Round>>,
 }
 
-/// Work of all threads together, each by its number.
+/// Work of all threads in one round, called with the thread's number.
 type Round = Arc<dyn Fn(usize) + Send + Sync>;
 
 impl Threads {
-    /// Starts the threads; their number includes the caller's. There are fewer if the system refuses more.
+    /// Starts the threads; their number includes the caller's. There are fewer if the operating system
+    /// refuses more.
     pub fn start(threads: usize) -> Threads {
         let helper = |thread| {
             let (rounds, asked) = channel::<Round>();
@@ -60,7 +61,7 @@ impl Threads {
             }
         });
         for helper in &self.helpers {
-            // A missing thread does no harm: the others do its jobs.
+            // A missing thread does no harm: the others run its jobs.
             let _ = helper.send(round.clone());
         }
         round(0);
@@ -78,7 +79,7 @@ fn in_order<R>(jobs: usize, results: &Receiver<(usize, thread::Result<R>)>) -> V
     found.into_iter().flatten().collect()
 }
 
-/// Receives the next message: first by polling, then asleep.
+/// Receives the next message: polls first, then blocks.
 fn next<T>(inbox: &Receiver<T>) -> Result<T, RecvError> {
     let begin = Instant::now();
     while begin.elapsed() < AWAKE {

@@ -25,7 +25,7 @@ fn spec(reward: RewardKind) -> BatchSpec {
     }
 }
 
-/// Returns actions of robots that keep their upper bodies at zero and stand.
+/// Returns actions with which robots stand and keep their upper bodies at zero.
 fn standing(worlds: usize) -> Vec<f32> {
     let mut row = [0.0; 35];
     row[34] = 0.74;
@@ -122,7 +122,7 @@ fn seeds_are_those_of_the_episodes_index() {
         seeds(batch.reset(&[Some(None), Some(None)], SeenArrays::of_states(&mut seen)).unwrap()),
         [2000, 2001]
     );
-    // World 0 is over sooner, twice.
+    // The episode of world 0 ends early, twice.
     for round in 1..=2 {
         held(&batch.worlds[0]).over = true;
         let begun = stepped(&mut batch, Autoreset::NextStep, &mut seen);
@@ -168,7 +168,7 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     assert_eq!((next[0].env_steps, next[0].seed), (1, 2001));
 }
 
-/// A GPU, if this build and the machine have one, renders the images of all worlds together.
+/// If this build and the machine have a GPU, it renders the images of all worlds together.
 #[test]
 fn pictures_are_drawn_where_the_policy_looks() {
     for renderer in [RendererKind::Cpu, RendererKind::Gpu] {

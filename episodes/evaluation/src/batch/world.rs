@@ -1,4 +1,4 @@
-//! One world of a batch: episode after episode.
+//! One world of a batch, which plays one episode after another.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -19,8 +19,8 @@ const FIRST_SEED: u32 = 2000;
 pub enum RewardKind {
     /// 1 for each phase that the step reaches.
     Sparse,
-    /// The step's increase of the task's progress: phases reached, and the nearness of the next one, from 0
-    /// to 1.
+    /// The step's increase of the task's progress: number of phases reached, plus the nearness of the next
+    /// one, from 0 to 1.
     Dense,
 }
 
@@ -35,7 +35,7 @@ impl RewardKind {
     }
 }
 
-/// Outcome of a step in one world, or of the beginning of an episode there.
+/// Outcome of a step in one world, or of the start of an episode there.
 #[derive(Clone, Debug, Default)]
 pub struct WorldStep {
     pub reward: f64,
@@ -54,7 +54,7 @@ pub struct WorldStep {
     pub next_seed: Option<u32>,
     /// Text of the simulator's failure; `None` without one.
     pub failure: Option<String>,
-    /// Share of the episode's joint targets that were beyond the joints' limits.
+    /// Share of the episode's joint targets beyond the joints' limits.
     pub joints_clamped_share: f64,
 }
 
@@ -73,18 +73,18 @@ pub struct SeenStep {
     pub seen: SeenWorld,
     /// Final observation of the episode, if the next one has begun in the same step.
     pub last: Option<SeenWorld>,
-    /// True if images are still to be rendered, together with those of other worlds.
+    /// True if images have been deferred, to be rendered together with images of other worlds.
     pub undrawn: bool,
 }
 
-/// A world of a batch, with one episode after another.
+/// A world of a batch, which plays one episode after another.
 pub struct BatchWorld {
     index: usize,
-    /// Difference between the seeds of a world's successive episodes: the number of worlds.
+    /// Difference between the seeds of a world's successive episodes, which is the number of worlds.
     stride: u32,
     /// Seed with which this round began; `None` before the first.
     round_seed: Option<u32>,
-    /// Number of this round's episodes that have begun.
+    /// Number of episodes that have begun in this round.
     episodes: u32,
     /// `None` before the first episode, and after a panic.
     pub session: Option<Session>,
@@ -104,7 +104,7 @@ impl BatchWorld {
         if self.over { autoreset != Autoreset::Disabled } else { self.session.is_some() }
     }
 
-    /// Begins a round with this seed, or with the one after that of the last round.
+    /// Begins a round with this seed, or else with the last round's seed plus the stride.
     pub fn reset(&mut self, spec: &BatchSpec, seed: Option<u32>) -> Result<SeenStep, BatchError> {
         let next = match self.round_seed {
             Some(last) => last.wrapping_add(self.stride),
@@ -115,8 +115,8 @@ impl BatchWorld {
         self.begin(spec)
     }
 
-    /// Begins the next episode of the round. Its seed depends on its index alone: an early end of another
-    /// episode does not change it.
+    /// Begins the next episode of the round. Its seed depends only on its index in the round: an early end of
+    /// another episode does not change it.
     fn begin(&mut self, spec: &BatchSpec) -> Result<SeenStep, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
@@ -125,7 +125,7 @@ impl BatchWorld {
         let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
         let session = Session::start(&episode, folder.as_deref())?;
         if let Some(reason) = session.recording_failed() {
-            // A caller that wants a recording has no use for an unrecorded episode.
+            // A caller that requests a recording has no use for an unrecorded episode.
             return Err(BatchError::NotRecorded { seed, reason: reason.into() });
         }
         let session = self.session.insert(session);
@@ -140,7 +140,7 @@ impl BatchWorld {
         Ok(look(spec, session, outcome, true))
     }
 
-    /// Returns the joint rows of the commands in force; zeros without an episode.
+    /// Returns the joint rows of the present commands; zeros without an episode.
     pub fn joint_rows(&self, robots: usize) -> Vec<Vec<f64>> {
         match &self.session {
             Some(session) => session.present().robots.iter().map(|robot| joint_row(&robot.command)).collect(),
@@ -148,7 +148,7 @@ impl BatchWorld {
         }
     }
 
-    /// Carries out a row of each robot, or begins the next episode.
+    /// Executes one row for each robot, or begins the next episode.
     pub fn step(
         &mut self,
         spec: &BatchSpec,
@@ -166,7 +166,7 @@ impl BatchWorld {
             None => SeenStep { outcome, seen: SeenWorld::default(), last: None, undrawn: false },
         };
         if self.over && autoreset == Autoreset::SameStep {
-            // An episode's last images cannot be deferred: its world is about to be replaced.
+            // An episode's last images cannot be deferred, because its world is about to be replaced.
             if let Some(session) = self.session.as_mut().filter(|_| step.undrawn) {
                 step.seen.pictures = draw(spec, session);
             }
@@ -177,8 +177,7 @@ impl BatchWorld {
         Ok(step)
     }
 
-    /// Makes the call of a step and returns its outcome. An error in a world is reported for this world
-    /// alone.
+    /// Makes the call of a step and returns its outcome. An error affects only this world.
     fn advance(&mut self, spec: &BatchSpec, call: &ToolCall) -> WorldStep {
         let Some(session) = &mut self.session else { return WorldStep::default() };
         let (seed, before) = (session.spec().seed, session.reached_phases());
@@ -219,7 +218,7 @@ impl BatchWorld {
         }
     }
 
-    /// Returns a folder that no other episode has.
+    /// Returns a folder that no other episode uses.
     fn folder(&self, record: &Path, episode: &EpisodeSpec) -> PathBuf {
         let name = format!("{}-world{}-seed{}", episode.task.id, self.index, episode.seed);
         let again = (2..).map(|time| record.join(format!("{name}-{time}")));
@@ -227,7 +226,7 @@ impl BatchWorld {
         free.unwrap_or_else(|| record.join(&name))
     }
 
-    /// Ends the episode, if one is under way, and closes its recording, which has the result.
+    /// Ends the episode, if one is in progress, and closes its recording, which contains the result.
     pub fn close(&mut self) {
         if let Some(session) = self.session.take() {
             session.close();
@@ -235,8 +234,8 @@ impl BatchWorld {
     }
 }
 
-/// Returns the observation of a world after a step. Images are rendered only if `draws` is true, and
-/// deferred if they are better rendered together with those of other worlds.
+/// Returns the observation of a world after a step. Images are rendered only if `draws` is true. They are
+/// deferred if it is faster to render them together with those of other worlds.
 fn look(spec: &BatchSpec, session: &mut Session, outcome: WorldStep, draws: bool) -> SeenStep {
     let mut state_rows = Vec::with_capacity(session.present().robots.len() * STATE_COLUMNS);
     for robot in &session.present().robots {

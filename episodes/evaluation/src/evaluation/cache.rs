@@ -1,5 +1,4 @@
-//! Cache of single episodes. Each is stored in a separate file. The next run uses it if the episode is the
-//! same.
+//! Cache of single episodes. Each episode has a file, which the next run uses if the episode is the same.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -18,16 +17,16 @@ use crate::results::{Attempt, PlayedEpisode, episode_note, failures_of_policy, u
 
 /// Outcome of a planned episode.
 pub enum PlannedOutcome {
-    /// An earlier run has played it. Boxed, because the last variant is small.
+    /// An earlier run has played it. Boxed to keep the enum small.
     Kept(Box<PlayedEpisode>),
     Played(Box<PlayedEpisode>),
-    /// It could not be started, with the reason.
+    /// It could not be started, for this reason.
     LeftOut(String),
     /// Another process plays it.
     Elsewhere,
 }
 
-/// The folder of single episodes, and the properties that must agree for an episode to be reused.
+/// The folder of single episodes, and the properties on which reuse of an episode depends.
 #[derive(Clone)]
 pub struct EpisodeCache<'a> {
     pub plan: &'a EvaluationPlan<'a>,
@@ -74,7 +73,7 @@ impl EpisodeCache<'_> {
     }
 
     fn load_or_play_alone(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
-        // Another process may have played it since the last look.
+        // Another process may have played it since the last check.
         if let Some(kept) = self.load_kept(spec)? {
             return Ok(kept);
         }
@@ -106,8 +105,8 @@ impl EpisodeCache<'_> {
         }
     }
 
-    /// Returns an earlier run's episode, if it is this one and counts. A file that is damaged, renamed or
-    /// from other rules counts as missing.
+    /// Returns an earlier run's episode if it is the same episode and counts. A file that is damaged, renamed
+    /// or from other rules is ignored.
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let cached = self.earlier(spec)?;
         let is_whole = self.is_not_kept(&cached)
@@ -115,7 +114,7 @@ impl EpisodeCache<'_> {
         (is_whole && cached.counts()).then_some(cached)
     }
 
-    /// Returns an earlier run's result of this episode, whether it counts or is played again.
+    /// Returns an earlier run's result of this episode, even if the result does not count.
     fn earlier(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let cached: PlayedEpisode = serde_json::from_slice(&self.read(spec)?).ok()?;
         let by = (&cached.policy, cached.locomotion.as_str());
@@ -137,7 +136,7 @@ impl EpisodeCache<'_> {
     }
 
     /// Returns `true` if the policy itself failed, and the episode has been retried as often as the plan
-    /// says.
+    /// allows.
     fn keeps_failure(&self, result: &ResultReply, attempts: &[Attempt]) -> bool {
         result.ended == EndReason::PolicyFailed && failures_of_policy(attempts) >= self.plan.retries as usize
     }
@@ -147,7 +146,7 @@ impl EpisodeCache<'_> {
         self.plan.files.only_successful && !played.succeeded()
     }
 
-    /// Updates the file of a cached episode with how it counts now.
+    /// Updates the file of a cached episode if its failure counts now.
     fn keep(&self, spec: &EpisodeSpec, kept: PlayedEpisode) -> Result<PlayedEpisode, EvaluationError> {
         match kept.keep_failed {
             true => self.write(spec, kept),
@@ -160,7 +159,7 @@ impl EpisodeCache<'_> {
         self.plan.record.then(|| self.folder.join(name(spec)))
     }
 
-    /// Stores the outcome of an episode after these earlier attempts.
+    /// Stores the outcome of an episode, with the earlier attempts.
     fn store(
         &self,
         spec: &EpisodeSpec,
@@ -201,7 +200,7 @@ impl EpisodeCache<'_> {
     }
 }
 
-/// Returns `true` if the recording in `folder` is whole, and belongs to the episode with this result. Its
+/// Returns `true` if the recording in `folder` is complete and belongs to the episode with this result. Its
 /// `result.json` is written last.
 fn is_recorded(folder: &Path, result: &ResultReply) -> bool {
     let bytes = std::fs::read(folder.join(RESULT_FILE)).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Identity of a run, stored in `run.json`: its policy, episodes, rules and build. One folder holds one
+//! Identity of a run, stored in `run.json`: its policy, episodes, rules and build. Each folder contains one
 //! run.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,10 +12,10 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::{EvaluationPlan, Starts};
 use crate::results::{PlayedEpisode, PolicyCard, SeedList};
 
-/// Maximum number of differences that an error names.
+/// Maximum number of differences that an error lists.
 const MAX_DIFFERENCES: usize = 6;
 
-/// Maximum length of the part of a folder's name that comes from the policy's name, in characters.
+/// Maximum number of characters of a policy's name in a folder's name.
 const MAX_NAME_CHARS: usize = 40;
 
 /// Fields of a spec that differ between the episodes of a run.
@@ -28,13 +28,12 @@ pub struct RunIdentity {
     pub policy: PolicyCard,
     /// Name of the base controller; files of different content have different names.
     pub controller: String,
-    /// The spec that all its episodes share.
+    /// The part of the spec that all its episodes share.
     pub rules: Value,
-    /// Its tasks by id, each with its source: built in, or the hashes of a task file and of an instructions
-    /// file.
+    /// Source of each task, by id: built in, or the hashes of a task file and of an instructions file.
     pub tasks: BTreeMap<String, String>,
     pub seeds: SeedList,
-    /// Starts of its episodes; `None` for the tasks' own beginnings.
+    /// Starts of its episodes; `None` if they begin at the tasks' own beginnings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub starts: Option<Value>,
     /// Builds that have played it, the most recent last.
@@ -42,7 +41,7 @@ pub struct RunIdentity {
 }
 
 impl RunIdentity {
-    /// Returns the identity of the run that plays `plan` on `build`, whose base controller has this name.
+    /// Returns the identity of the run that plays `plan` on `build` with the base controller of this name.
     pub fn of_plan(plan: &EvaluationPlan, controller: &str, build: &str) -> RunIdentity {
         let seed = plan.seeds.first().copied().unwrap_or_default();
         let planned = |task: &Task| plan.spec(task, seed, Start::Task);
@@ -81,8 +80,7 @@ impl RunIdentity {
         .read_back()
     }
 
-    /// Returns the identity of a run of which only one episode is known: earlier builds wrote no
-    /// `run.json`.
+    /// Returns the identity of a run from one of its episodes. Earlier builds wrote no `run.json`.
     pub fn of_episode(played: &PlayedEpisode) -> RunIdentity {
         let spec = &played.spec;
         RunIdentity {
@@ -97,20 +95,20 @@ impl RunIdentity {
         .read_back()
     }
 
-    /// Writes the identity to text and reads it back. Numbers may lose a bit in text, so only parsed values
-    /// are compared with parsed values.
+    /// Serializes the identity to text and parses it. Numbers may lose a bit in text, so both sides of a
+    /// comparison must be parsed values.
     fn read_back(self) -> RunIdentity {
         let read = serde_json::to_string(&self).and_then(|text| serde_json::from_str(&text));
         read.unwrap_or(self)
     }
 
-    /// Returns the build that played it last.
+    /// Returns the most recent build that has played it.
     pub fn build(&self) -> &str {
         self.builds.last().map_or("", String::as_str)
     }
 
-    /// Returns the differences between this run and the run `now`, a line each. The build is left out;
-    /// tasks and seeds may have been added.
+    /// Returns the differences between this run and the run `now`, a line each. The build, and additional
+    /// tasks and seeds, are no differences.
     pub fn differences(&self, now: &RunIdentity) -> Vec<String> {
         let (was, is) = (self.leaves(), now.leaves());
         let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
@@ -135,7 +133,7 @@ impl RunIdentity {
         found
     }
 
-    /// Returns `true` if the run `now` has the same episodes, and more.
+    /// Returns `true` if the run `now` has tasks or seeds in addition to those of this run.
     pub fn grows_to(&self, now: &RunIdentity) -> bool {
         self.tasks.len() < now.tasks.len() || self.seeds.0.len() < now.seeds.0.len()
     }
@@ -167,10 +165,9 @@ impl RunIdentity {
     }
 }
 
-/// Returns the default folder of the run that plays `plan` as the policy called `name`, in the folder
-/// `runs`.
+/// Returns the default folder in `runs` for the run that plays `plan` with the policy called `name`.
 pub fn default_folder(plan: &EvaluationPlan, name: Option<&str>, runs: &Path) -> std::path::PathBuf {
-    // Two files with one name would share a default, and the second would be refused there.
+    // Two controller files with one name would share a default, and the second would be refused there.
     let controller = json!(plan.locomotion).to_string();
     let mut identity = RunIdentity::of_plan(plan, &controller, "");
     if let Some(name) = name {
@@ -194,7 +191,7 @@ fn rules(spec: &EpisodeSpec) -> Value {
     if let Value::Object(fields) = &mut rules {
         fields.retain(|name, _| !OF_SINGLE_EPISODES.contains(&name.as_str()));
         if let Some(Value::Object(keyed)) = fields.get_mut("keyed_seed") {
-            // The seed drawn by the key belongs to single episodes, too.
+            // The seed that the key has drawn also belongs to single episodes.
             keyed.retain(|name, _| name != "drawn");
         }
     }
@@ -219,7 +216,7 @@ fn collect(path: &str, value: &Value, found: &mut BTreeMap<String, String>) {
     }
 }
 
-/// Converts a policy's name to a part of a folder's name.
+/// Converts a policy's name to part of a folder's name.
 fn plain(name: &str) -> String {
     let mut plain = String::new();
     for letter in name.chars() {

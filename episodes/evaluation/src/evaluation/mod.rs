@@ -1,4 +1,4 @@
-//! Evaluations: plays episodes over seeds in parallel worlds, stores each result, and counts.
+//! Evaluations: play episodes over seeds in parallel worlds, store each result, and count outcomes.
 
 mod cache;
 mod identity;
@@ -63,8 +63,7 @@ pub enum EvaluationError {
 }
 
 impl EvaluationError {
-    /// Returns the error with the number of planned episodes, and of those that the next run finds in the
-    /// cache.
+    /// Returns the error with the number of planned episodes and the number of episodes in the cache.
     fn after(self, kept: usize, planned: usize) -> EvaluationError {
         match self {
             EvaluationError::PolicyAbsent { reason, .. } => {
@@ -98,12 +97,12 @@ pub enum EpisodeEvent<'a> {
     LeftOut,
 }
 
-/// Plays the episodes of the plan's share that `folder` does not hold yet, and writes `results.json` there.
+/// Plays the episodes of the plan's share that are missing in `folder`, and writes `results.json` there.
 /// Calls `progress` after each episode of the share.
 ///
 /// # Errors
 ///
-/// If the folder holds another run, cannot be written, or an episode cannot be played.
+/// If the folder belongs to another run or cannot be written, or an episode cannot be played.
 pub fn evaluate(
     plan: &EvaluationPlan,
     folder: &Path,
@@ -112,13 +111,13 @@ pub fn evaluate(
     EvaluationRun::begin(plan, folder)?.play(progress)
 }
 
-/// An evaluation in its own folder, in which this process plays.
+/// An evaluation in its folder, in which this process plays episodes.
 pub struct EvaluationRun<'a> {
     folder: &'a Path,
     place: EvaluationFolder,
     cache: EpisodeCache<'a>,
     work: Vec<EpisodeSpec>,
-    /// Episodes without a demonstration.
+    /// Names of the episodes that have no demonstration to begin in.
     undemonstrated: Vec<String>,
 }
 
@@ -130,7 +129,7 @@ pub struct KeptEpisodes {
     /// Number of cached episodes that another build has played.
     pub of_other_builds: usize,
     pub to_play: usize,
-    /// Number of episodes whose result this build cannot read. They are played again, and the results
+    /// Number of episodes whose result this build cannot parse. They are played again, and the results
     /// replaced.
     pub unreadable: usize,
 }
@@ -140,7 +139,7 @@ impl<'a> EvaluationRun<'a> {
     ///
     /// # Errors
     ///
-    /// Returns [`EvaluationError::OtherRun`] if the folder holds another run, which is not touched.
+    /// Returns [`EvaluationError::OtherRun`] if the folder contains another run, which remains unchanged.
     pub fn begin(plan: &'a EvaluationPlan, folder: &'a Path) -> Result<EvaluationRun<'a>, EvaluationError> {
         let build = tandem_episodes::build().map_err(EpisodeError::Build)?;
         let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name();
@@ -152,7 +151,7 @@ impl<'a> EvaluationRun<'a> {
         Ok(EvaluationRun { folder, place, cache, work, undemonstrated })
     }
 
-    /// Returns `true` if two processes in this folder would not notice each other.
+    /// Returns `true` if two processes in this folder would not detect each other.
     pub fn is_without_locks(&self) -> bool {
         self.place.without_locks
     }
@@ -170,18 +169,18 @@ impl<'a> EvaluationRun<'a> {
         }
     }
 
-    /// Returns the summary of the episodes that are cached at present.
+    /// Returns the summary of the episodes that are in the cache.
     pub fn so_far(&self) -> Evaluation {
         let episodes = self.work.iter().filter_map(|spec| self.cache.load(spec)).collect();
         summary::summarise(&self.cache, episodes, self.undemonstrated.clone())
     }
 
-    /// Plays the episodes that are not cached yet, writes `results.json`, and calls `progress` after each
+    /// Plays the episodes that are not in the cache, and writes `results.json`. Calls `progress` after each
     /// episode.
     ///
     /// # Errors
     ///
-    /// If an episode or a file fails. Cached episodes are kept.
+    /// If an episode or a file fails. Episodes in the cache are kept.
     pub fn play(&self, progress: &(dyn Fn(EpisodeEvent) + Sync)) -> Result<Evaluation, EvaluationError> {
         let shard = self.cache.plan.shard;
         let planned =
@@ -204,7 +203,7 @@ impl<'a> EvaluationRun<'a> {
     }
 }
 
-/// Returns the name of a share's results file: shares may use one folder.
+/// Returns the name of a share's results file. Several shares may use one folder.
 fn results_name(shard: Shard) -> String {
     match shard {
         Shard::WHOLE => "results.json".into(),

@@ -23,11 +23,11 @@ pub struct EvaluationPlan<'a> {
     /// The policy that plays.
     pub player: &'a dyn Policy,
     pub protocol: Protocol,
-    /// The scene, in place of the tasks' own.
+    /// Scene that replaces the tasks' own scenes.
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
-    /// Knowledge of the robots about themselves.
+    /// Configuration of the robots' sensors and state estimate.
     pub sensing: Sensing,
     pub renderer: RendererKind,
     /// Model of the robots' cameras.
@@ -38,29 +38,28 @@ pub struct EvaluationPlan<'a> {
     pub disclosure: Disclosure,
     /// Hints to policies on how to grasp.
     pub hints: Hints,
-    /// Instructions in place of the tasks' own.
+    /// Instructions that replace the tasks' own.
     pub instructions: Instructions,
     /// Variation of the episodes beyond the benchmark.
     pub variation: Variation,
     /// Stress on the episodes.
     pub stress: Option<Stress>,
-    /// Limit of a policy's thinking time in an episode; `None` for the protocol's own.
+    /// Limit of a policy's thinking time in an episode; `None` for the protocol's limit.
     pub thinking_limit_s: Option<u32>,
     pub tasks: Vec<Task>,
     pub seeds: Vec<u32>,
     pub starts: Starts,
     pub shard: Shard,
-    /// Number of worlds that run in parallel, each on a thread of its own.
+    /// Number of worlds that run in parallel, each on a separate thread.
     pub jobs: usize,
-    /// True if every episode is recorded in a folder of its own (`episode.mcap`, `strip.png`,
-    /// `report.html`).
+    /// True if every episode is recorded in a separate folder (`episode.mcap`, `strip.png`, `report.html`).
     pub record: bool,
-    /// The files among these that are kept.
+    /// Selection of these files to keep.
     pub files: KeptFiles,
-    /// Number of retries of an episode in which the policy itself failed, over all runs. After them, it
-    /// counts as a failure.
+    /// Maximum number of retries, over all runs, of an episode in which the policy itself failed. After these
+    /// retries, it counts as a failure.
     pub retries: u32,
-    /// Key that draws worlds for public seeds; `None` if the seeds are used as they are.
+    /// Key by which worlds are drawn for public seeds; `None` if the seeds are used directly.
     pub seed_key: Option<SeedKey>,
     /// Treatment of a run that the folder already holds.
     pub existing: ExistingRun,
@@ -82,24 +81,25 @@ impl SeedKey {
     }
 }
 
-/// Treatment of a run that a folder already holds. The same run continues in any case.
+/// Treatment of a run that the folder already holds. If it is the same run, the evaluation continues it in
+/// any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExistingRun {
-    /// Another run is left as it is, and the evaluation refused.
+    /// A different run is left as it is, and the evaluation is refused.
     #[default]
     Refuse,
-    /// The same run of another build continues with this build, and keeps its episodes.
+    /// The same run of another build is continued with this build, and its episodes are kept.
     ResumeWithNewBuild,
-    /// It is deleted.
+    /// A different run is deleted.
     Overwrite,
 }
 
-/// Files that are kept of recorded episodes; by default all.
+/// Files of recorded episodes that are kept; by default all.
 #[derive(Clone, Copy, Debug)]
 pub struct KeptFiles {
     /// True if each episode gets `strip.png` and `report.html`.
     pub pages: bool,
-    /// True if only the result is kept of an episode that failed.
+    /// True if only the result of a failed episode is kept.
     pub only_successful: bool,
 }
 
@@ -112,26 +112,26 @@ impl Default for KeptFiles {
 /// Starts of the episodes.
 #[derive(Clone, Debug)]
 pub enum Starts {
-    /// They begin at the task's own beginning, and every phase counts.
+    /// Episodes begin at the task's own beginning, and every phase counts.
     Task,
-    /// Each begins where one of these phases began in a demonstration of the same task and seed, and that
-    /// phase alone counts.
+    /// Each episode begins at the start of one of these phases in a demonstration of the same task and seed.
+    /// Only that phase counts.
     Phases {
-        /// Folder that `tandem collect` or `tandem serve` wrote.
+        /// Folder written by `tandem collect` or `tandem serve`.
         demonstrations: PathBuf,
-        /// Numbers or ids, for example `p2` or `transfer`. A task without such a phase has no episode that
-        /// begins there.
+        /// Numbers or ids of phases, for example `p2` or `transfer`. A task that lacks a phase has no episode
+        /// for it.
         phases: Vec<String>,
         /// True if episodes begin in the training demonstrations. The demonstrations' seeds replace the
         /// plan's.
         training: bool,
     },
-    /// Each begins `before_s` seconds before the failure of one of these episodes, in its world. Tasks and
-    /// seeds are those of the failed episodes.
+    /// Each episode begins `before_s` seconds before the failure of one of these episodes, in the same world.
+    /// Tasks and seeds are those of the failed episodes.
     Moments { failed: Vec<FailedEpisode>, before_s: u32 },
 }
 
-/// The share of one process: every episode whose number divided by `of` leaves the remainder `index`.
+/// The share of one process: every episode whose index divided by `of` leaves the remainder `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     pub index: usize,
@@ -147,7 +147,7 @@ impl EvaluationPlan<'_> {
     /// Default number of retries of an episode.
     pub const DEFAULT_RETRIES: u32 = 2;
 
-    /// Returns the spec of one of the episodes.
+    /// Returns the spec of one episode.
     pub fn spec(&self, task: &Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {
             robot: self.robot.clone(),
@@ -169,8 +169,8 @@ impl EvaluationPlan<'_> {
         .keyed(self.seed_key.as_ref().and_then(|key| key.of(seed)))
     }
 
-    /// Returns the spec of an episode that begins before a recorded one failed: its world, under this
-    /// plan's rules.
+    /// Returns the spec of an episode that begins shortly before a recorded failure. It has the world of the
+    /// failed episode and the rules of this plan.
     fn again(&self, failed: &FailedEpisode, before_s: u32) -> EpisodeSpec {
         let FailedEpisode { spec, recording, .. } = failed;
         let control_step = failed.step_before(before_s);
@@ -202,8 +202,8 @@ impl EvaluationPlan<'_> {
         self.named(EpisodeSpec::peculiarities)
     }
 
-    /// Applies `of` to an episode of each kind and collects the results. They depend only on task files,
-    /// instructions and retried moments.
+    /// Applies `of` to one spec of each kind of episode and collects the results. They depend only on task
+    /// files, instructions and retried episodes.
     fn named(&self, of: fn(&EpisodeSpec) -> Vec<String>) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
@@ -223,7 +223,8 @@ impl EvaluationPlan<'_> {
         found
     }
 
-    /// Returns this share of the episodes, and those of it that are left out for lack of a demonstration.
+    /// Returns the episodes of this share, and the names of those that are left out for lack of a
+    /// demonstration.
     pub fn episodes(&self) -> (Vec<EpisodeSpec>, Vec<String>) {
         let (mut found, mut left_out) = (Vec::new(), Vec::new());
         let is_own = |number: &usize| number % self.shard.of == self.shard.index;
@@ -254,7 +255,7 @@ impl EvaluationPlan<'_> {
         (found, left_out)
     }
 
-    /// Returns the seeds of `task` that are played.
+    /// Returns the seeds with which `task` is played.
     fn seeds_of(&self, task: &Task) -> Vec<u32> {
         match &self.starts {
             Starts::Phases { demonstrations, training: true, .. } => training_seeds(demonstrations, task),
@@ -277,11 +278,11 @@ impl EvaluationPlan<'_> {
     }
 }
 
-/// Maximum number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
-/// export`.
+/// Maximum number of training demonstrations of a task, in the benchmark and in the split by `tandem export`.
 const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
 
-/// Returns the folders of a task's demonstrations, each with the prefix of their names before the seed.
+/// Returns the folders of a task's demonstrations, each with the part of the demonstrations' names before the
+/// seed.
 ///
 /// `collect` and `serve` write them in this layout.
 fn demonstration_folders(folder: &Path, task: &Task) -> [(PathBuf, String); 3] {
@@ -297,7 +298,7 @@ fn demonstration(folder: &Path, task: &Task, seed: u32) -> Option<PathBuf> {
     recordings.into_iter().find(|recording| recording.exists())
 }
 
-/// Returns the seeds of a task's training demonstrations in a folder: the lowest ones.
+/// Returns the lowest seeds of a task's demonstrations in a folder, which are used for training.
 pub fn training_seeds(folder: &Path, task: &Task) -> Vec<u32> {
     let mut seeds = BTreeSet::new();
     for (folder, begins) in demonstration_folders(folder, task) {

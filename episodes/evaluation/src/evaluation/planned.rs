@@ -1,4 +1,4 @@
-//! Number of planned episodes of an evaluation, and its state, for other processes that display them.
+//! Number of an evaluation's planned episodes, and its state, for other processes that display them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,12 @@ use tandem_episodes::write_whole;
 
 use super::{EvaluationError, Shard};
 
-/// Name of the file if one process plays everything; `SHARE` is its prefix if each process plays a share.
+/// Name of the file if one process plays all episodes; `SHARE` is the prefix of its name if each process
+/// plays a share.
 const WHOLE: &str = "planned.json";
 const SHARE: &str = "planned-";
 
-/// Number of episodes of a share of an evaluation, and its state.
+/// Number of episodes in a share of an evaluation, and the share's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedEpisodes {
     pub episodes: usize,
@@ -46,8 +47,8 @@ impl PlannedEpisodes {
         Ok(write_whole(&folder.join(name), serde_json::to_string(&self)?.as_bytes())?)
     }
 
-    /// Reads all shares of an evaluation that have begun, combined into one; `None` if no share has written
-    /// a file.
+    /// Reads the files of all shares that have begun, and combines them; `None` if no share has written a
+    /// file.
     pub fn read_all(folder: &Path) -> Option<PlannedEpisodes> {
         let read = |path: PathBuf| serde_json::from_slice::<PlannedEpisodes>(&fs::read(path).ok()?).ok();
         if let Some(whole) = read(folder.join(WHOLE)) {
@@ -58,7 +59,7 @@ impl PlannedEpisodes {
         shares.filter_map(|file| read(file.path())).reduce(PlannedEpisodes::with)
     }
 
-    /// Combines two shares. The result is being played as long as one of them is.
+    /// Combines two shares. The result is `Playing` if either share is.
     fn with(self, other: PlannedEpisodes) -> PlannedEpisodes {
         let state = match (self.state, other.state) {
             (Some(RunState::Complete), Some(RunState::Complete)) => Some(RunState::Complete),

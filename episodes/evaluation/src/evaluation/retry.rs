@@ -1,4 +1,4 @@
-//! Failed episodes that are retried from shortly before their failure.
+//! Failed episodes that are retried from a moment shortly before their failure.
 
 use std::path::{Path, PathBuf};
 
@@ -55,8 +55,7 @@ pub fn failed_episodes(folder: &Path) -> Result<(Vec<FailedEpisode>, Vec<String>
     Ok((failed, left_out))
 }
 
-/// Returns the name of a retried episode's file and folder. Failures of one seed may differ in their
-/// stress.
+/// Returns the name of a retried episode's file and folder. Failed episodes of one seed may differ in stress.
 pub(super) fn again_name(spec: &EpisodeSpec) -> String {
     let stress = spec.stress.map(|stress| format!("-{stress}")).unwrap_or_default();
     format!("{}-{}{stress}-again", spec.task.id, spec.seed)

@@ -17,27 +17,27 @@ use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
 /// The file with the run's identity.
 const IDENTITY_FILE: &str = "run.json";
 
-/// The file that every process locks, shared with the others, while it plays episodes of the run.
+/// File on which every process holds a shared lock while it plays episodes of the run.
 const PRESENCE_FILE: &str = "run.lock";
 
 /// The file that is locked while the identity is read and written.
 const IDENTITY_LOCK_FILE: &str = "run.json.lock";
 
-/// Maximum number of attempts at a lock that others hold for a moment.
+/// Maximum number of attempts at a lock that other processes hold briefly.
 const MAX_ATTEMPTS: u32 = 40;
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The folder of a run in which this process plays.
 #[derive(Debug)]
 pub struct EvaluationFolder {
-    /// Builds whose results are kept there.
+    /// Builds whose results in the folder are reused.
     pub builds: Vec<String>,
-    /// True if the file system has no locks, so that processes in the same folder do not notice each other.
+    /// True if the file system has no locks, so that processes in the same folder do not detect each other.
     pub without_locks: bool,
     _presence: Option<FileLock>,
 }
 
-/// A different run in the folder, and the ways to continue.
+/// A different run in the folder, for an error that suggests ways to continue.
 #[derive(Debug)]
 pub struct OtherRun {
     pub folder: PathBuf,
@@ -75,7 +75,7 @@ impl fmt::Display for OtherRun {
 }
 
 impl EvaluationFolder {
-    /// Creates the run `now` in the folder, or continues it. Fails if the folder belongs to another run.
+    /// Creates the run `now` in the folder, or continues it. Fails if the folder contains a different run.
     pub fn open(
         folder: &Path,
         now: &RunIdentity,
@@ -107,7 +107,7 @@ impl EvaluationFolder {
     }
 }
 
-/// Returns `true` if a process plays in `folder`; `None` if the file system cannot report it, or the lock
+/// Returns `true` if a process plays in `folder`. Returns `None` if the file system has no locks, or the lock
 /// file is missing.
 pub fn is_being_played(folder: &Path) -> Option<bool> {
     let path = folder.join(PRESENCE_FILE);
@@ -121,7 +121,7 @@ pub fn is_being_played(folder: &Path) -> Option<bool> {
     }
 }
 
-/// Attempts several times to take a lock that others hold for a moment only.
+/// Attempts several times to take a lock that other processes hold only briefly.
 fn take(path: &Path, kind: LockKind) -> io::Result<Locking> {
     let attempts = if kind == LockKind::Shared { MAX_ATTEMPTS } else { 2 };
     for _ in 1..attempts {
@@ -133,8 +133,8 @@ fn take(path: &Path, kind: LockKind) -> io::Result<Locking> {
     FileLock::attempt(path, kind)
 }
 
-/// Compares the run `now` with the one in the folder, and writes the resulting identity. Returns the builds
-/// whose results are kept.
+/// Compares the run `now` with the run in the folder, and writes the resulting identity. Returns the builds
+/// whose results are reused.
 fn settle(
     folder: &Path,
     now: &RunIdentity,
@@ -169,7 +169,7 @@ fn settle(
     }
     let is_replaced = !differences.is_empty();
     if is_replaced {
-        // A folder without episodes has no owner.
+        // A folder without episodes can be reused for any run.
         if !kept.is_empty() || !alone {
             let kept = kept.len();
             let folder = folder.into();
@@ -188,7 +188,7 @@ fn settle(
     Ok(builds)
 }
 
-/// Returns the identity of the run that the folder declares.
+/// Returns the identity of the run from `run.json`.
 fn read(folder: &Path) -> Result<Option<RunIdentity>, EvaluationError> {
     let path = folder.join(IDENTITY_FILE);
     match fs::read(&path) {
@@ -213,7 +213,7 @@ fn read_episode(path: &Path) -> Option<PlayedEpisode> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Deletes the files of a run from its folder. A folder that holds no run is left alone.
+/// Deletes the files of a run from its folder. A folder without a run remains unchanged.
 fn clear(folder: &Path) -> io::Result<()> {
     if !folder.join(IDENTITY_FILE).exists()
         && !episodes_in(folder).iter().any(|path| read_episode(path).is_some())

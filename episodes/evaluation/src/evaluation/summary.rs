@@ -12,7 +12,7 @@ use super::cache::EpisodeCache;
 /// Counts of a task over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TaskSummary {
-    /// Number of episodes that count. All other counts, except the last two, refer to them.
+    /// Number of episodes that count. All other counts except the last two refer to these episodes.
     pub episodes: usize,
     pub p1: usize,
     pub p2: usize,
@@ -42,7 +42,8 @@ pub struct Evaluation {
     /// Departures from Tandem's defaults, for display after the policy's name.
     #[serde(skip)]
     pub peculiarities: Vec<String>,
-    /// Extra information that the policy was shown in any episode, beyond the benchmark's own policies.
+    /// Information that the policy was shown in any episode, but that the benchmark withholds from its own
+    /// policies.
     #[serde(skip_serializing_if = "BTreeSet::is_empty")]
     pub extra_information: BTreeSet<String>,
     /// Summary of the episodes that began at their task's beginning, by task.

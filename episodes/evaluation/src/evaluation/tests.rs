@@ -70,13 +70,13 @@ fn the_first_phase_that_was_missed_is_noted() {
     assert_eq!(second.as_deref(), Some("p2 was not reached in 812 steps"));
     assert_eq!(note([Some(4.2), Some(5.0), Some(6.0)]), None);
 
-    // If one phase counts, no other is missed.
+    // If only one phase counts, no other phase is reported as missed.
     let times = [Some(4.2), Some(5.0), None].into_iter().enumerate();
     let result = result("handover", 7, times.map(|(i, time_s)| (Phase::number(i), time_s)).collect());
     assert_eq!(missed_phase_note(&result, Some(1)), None);
     assert_eq!(missed_phase_note(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 
-    // If the simulator failed, the note says that.
+    // If the simulator failed, the note reports that.
     assert_eq!(episode_note(&result, Some(2)), missed_phase_note(&result, Some(2)));
     let failed = ResultReply { simulator_failure: Some("in step 813, physics diverged".into()), ..result };
     assert_eq!(
@@ -163,7 +163,8 @@ fn episodes_from_phases_need_demonstrations() {
     assert_eq!(left_out, ["p1", "p3"].map(|phase| format!("pouring seed 4 {phase}: no demonstration")));
 }
 
-/// The benchmark begins each phase once in each of 50 demonstrations, and in none of the validation split.
+/// The benchmark begins each phase once in each of 50 demonstrations, and never in demonstrations of the
+/// validation split.
 #[test]
 fn phases_begin_in_the_demonstrations_for_training() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,7 +210,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
         let times = vec![(Phase::number(phase), reached.then_some(4.2))];
         PlayedEpisode { result: result(id, seed, times), ..played(&cache, &spec) }
     };
-    // Handover has one collaborative phase, p2; all of CoPouring's are.
+    // Handover has one collaborative phase, p2; all phases of CoPouring are collaborative.
     let mut episodes = vec![from("handover", 0, 0, true), from("handover", 1, 0, true)];
     episodes.extend((0..4).map(|seed| from("handover", seed, 1, seed == 0)));
     episodes.extend((0..4).map(|seed| from("co_pouring", seed, 2, seed < 3)));
@@ -225,7 +226,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     );
     assert_eq!(level.two_robots.drop_share, Some(0.0));
     assert_eq!(level.three_robots, None);
-    // Tasks of three robots have means of their own.
+    // Tasks for three robots have separate means.
     episodes.push(from("big_table", 0, 0, true));
     episodes.push(from("big_table", 0, 1, false));
     let with_three = PhaseLevel::of(episodes.iter()).unwrap();
@@ -282,7 +283,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         assert_eq!(kept_after(&serde_json::to_string(&other).unwrap()), None, "another {what}");
     }
 
-    // An episode that was played without a recording is no demonstration.
+    // An episode that was played without a recording cannot serve as a demonstration.
     let recorded = EvaluationPlan { record: true, ..plan.clone() };
     let collector = EpisodeCache { plan: &recorded, ..cache };
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
@@ -298,7 +299,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     assert_eq!(collector.load(&spec), Some(same));
 }
 
-/// A policy that plays no episode.
+/// A policy that can play no episode.
 #[derive(Debug)]
 struct Unplayable(fn() -> PlayError);
 
@@ -312,7 +313,7 @@ impl Policy for Unplayable {
     }
 }
 
-/// A policy that fails itself in every episode.
+/// A policy that crashes in every episode.
 #[derive(Debug, Default)]
 struct FailingPolicy(AtomicU32);
 
@@ -330,8 +331,7 @@ impl Policy for FailingPolicy {
     }
 }
 
-/// A policy that fails itself whenever it is about to lose is retried as often as the plan says, and every
-/// attempt is kept.
+/// A policy that always crashes is retried as often as the plan allows, and all attempts are kept.
 #[test]
 fn a_policy_that_fails_itself_again_and_again_has_failed() {
     let folder = tempfile::tempdir().unwrap();
@@ -377,7 +377,7 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
         }
         workers::play_all(&cache, &work, &mut left_out, &|_| {}).map(|episodes| (episodes.len(), left_out))
     };
-    // A player that does not know a task plays none of its episodes.
+    // A player that does not support a task plays no episodes of it.
     let player = players::find("no_words").unwrap();
     let refused = player.play_episode(
         &EpisodeSpec::new(&tasks::find("handover").unwrap(), 1, Protocol::Benchmark),
@@ -423,7 +423,7 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
         (EndReason::Finished, 2),
         (EndReason::PolicyFailed, 2),
         (EndReason::SimulatorFailed, 1),
-        // A phase that was reached before the failure stays reached.
+        // A phase that was reached before the failure still counts as reached.
         (EndReason::PolicyFailed, 3),
         (EndReason::Abandoned, 0),
     ];

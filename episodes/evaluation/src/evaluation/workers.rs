@@ -1,5 +1,5 @@
-//! Parallel worlds, each on a thread of its own. The first failure stops the others after their present
-//! episode.
+//! Parallel worlds, each on a separate thread. After the first error, the other threads stop when their
+//! present episode ends.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
@@ -10,8 +10,8 @@ use super::cache::{EpisodeCache, PlannedOutcome};
 use super::{EpisodeEvent, EvaluationError};
 use crate::results::PlayedEpisode;
 
-/// Plays or loads every episode of `work`, and returns them in its order. Episodes that could not be
-/// started are added to `left_out`.
+/// Plays or loads every episode of `work`, and returns the episodes in the same order. Episodes that could
+/// not be started are added to `left_out`.
 pub fn play_all(
     cache: &EpisodeCache,
     work: &[EpisodeSpec],
@@ -20,7 +20,7 @@ pub fn play_all(
 ) -> Result<Vec<PlayedEpisode>, EvaluationError> {
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
-    // Episodes of other processes are taken up last, when they are most likely finished.
+    // Episodes that other processes play are handled last, when they are most likely finished.
     let elsewhere = Mutex::new(Vec::new());
     let (done, played) = mpsc::channel();
     let mut outcomes: Vec<(usize, PlannedOutcome)> = std::thread::scope(|scope| {
@@ -52,8 +52,8 @@ pub fn play_all(
         played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
     if let Some(error) = lock(&failure).take() {
-        // The count is of the episodes that the next run will find, including earlier episodes that were not
-        // reached.
+        // Counts all episodes that the next run will find, including cached episodes that this run did not
+        // reach.
         let kept = work.iter().filter(|spec| cache.load(spec).is_some()).count();
         return Err(error.after(kept, work.len()));
     }
@@ -62,7 +62,7 @@ pub fn play_all(
     for (number, outcome) in outcomes {
         match outcome {
             PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => episodes.push(*played),
-            // The thread that waits for an episode plays it, or finds it played.
+            // The thread that waits for this episode plays it, or finds its result.
             PlannedOutcome::Elsewhere => {}
             PlannedOutcome::LeftOut(reason) => {
                 let EpisodeSpec { task, seed, .. } = &work[number];
@@ -73,7 +73,7 @@ pub fn play_all(
     Ok(episodes)
 }
 
-/// Queue of the episodes that no thread has begun yet.
+/// Queue of the episodes that no thread has started yet.
 #[derive(Clone, Copy)]
 struct Queue<'a> {
     next: &'a AtomicUsize,
@@ -82,7 +82,8 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    /// Returns the number of the next episode, and whether to wait for another process that plays it.
+    /// Returns the index of the next episode, and `true` if the thread must wait for another process that
+    /// plays it.
     fn next(self) -> Option<(usize, bool)> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         if number < self.episodes {
@@ -95,7 +96,7 @@ impl Queue<'_> {
         lock(self.elsewhere).push(number);
     }
 
-    /// Empties the queue, so that no thread begins another episode.
+    /// Empties the queue, so that no thread starts another episode.
     fn stop(self) {
         self.next.store(self.episodes, Ordering::Relaxed);
         lock(self.elsewhere).clear();
@@ -103,7 +104,7 @@ impl Queue<'_> {
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // Nothing panics while it holds one of these locks.
+    // No thread panics while it holds one of these locks.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

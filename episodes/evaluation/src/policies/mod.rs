@@ -16,36 +16,37 @@ pub use open_loop::{OpenLoop, OpenLoopError};
 
 use crate::results::PolicyCard;
 
-/// A policy that plays episodes, several of them side by side.
+/// A policy that plays episodes, several of them in parallel.
 pub trait Policy: Debug + Send + Sync {
-    /// Returns the description that results include.
+    /// Returns the description of the policy for results.
     fn card(&self) -> PolicyCard;
 
-    /// Plays `spec` from its start to its result.
+    /// Plays `spec` from its start to its end.
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError>;
 
-    /// Returns what the policy is waiting for before an episode can begin; `None` if it is not waiting.
+    /// Returns the reason why an episode cannot begin yet; `None` if the policy is ready.
     fn waiting(&self) -> Option<PolicyWait> {
         None
     }
 
-    /// Returns `true` if the policy's user wants it to end.
+    /// Returns `true` if the user has interrupted the policy.
     fn is_interrupted(&self) -> bool {
         false
     }
 }
 
-/// A remote policy that can drive one robot of an episode. It computes commands for all robots, and only
-/// those of its own robot are executed.
+/// A remote policy that can drive one robot of an episode. It computes commands for all robots, but only
+/// those for its own robot are executed.
 pub trait PartnerPolicy: Debug + Send + Sync {
-    /// Returns the name by which people choose it and recordings name it.
+    /// Returns the name by which people select the policy and recordings identify it.
     fn name(&self) -> String;
 
-    /// Connects for an episode of `spec`, calls `connected` when that is done, and plays.
+    /// Connects for an episode of `spec`, calls `connected` once connected, and plays.
     ///
     /// # Errors
     ///
-    /// Returns a [`PlayError`] if it cannot connect. The inner [`PlayerError`] says why the play ended.
+    /// Returns a [`PlayError`] if it cannot connect. The inner [`PlayerError`] is the reason why the play
+    /// ended.
     fn play(
         &self,
         spec: &EpisodeSpec,
@@ -54,10 +55,10 @@ pub trait PartnerPolicy: Debug + Send + Sync {
     ) -> Result<Result<(), PlayerError>, PlayError>;
 }
 
-/// A wait of a policy, and its duration.
+/// A wait of a policy, with its reason and duration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PolicyWait {
-    /// The target, for example the addresses of its servers.
+    /// Subject of the wait, for example the addresses of the policy's servers.
     pub target: String,
     pub lasted: Duration,
 }
@@ -68,14 +69,14 @@ impl fmt::Display for PolicyWait {
     }
 }
 
-/// Output of an episode's files.
+/// Destination of an episode's files.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeOutput<'a> {
-    /// The episode's own folder, which does not exist yet.
+    /// The folder for this episode alone, which does not exist yet.
     pub folder: &'a Path,
     /// True if the episode is to be recorded there.
     pub record: bool,
-    /// True if a recorded episode also gets a strip of images and a page.
+    /// True if a recorded episode also gets an image strip and a page.
     pub pages: bool,
 }
 
@@ -85,7 +86,7 @@ impl<'a> EpisodeOutput<'a> {
         self.record.then_some(self.folder)
     }
 
-    /// Returns the run folder of the recording, with its pages option.
+    /// Returns the run folder of the recording, with its option for pages.
     fn run_folder(self) -> Option<RunFolder> {
         self.recording().map(|folder| RunFolder { pages: self.pages, ..RunFolder::from(folder) })
     }
@@ -106,13 +107,13 @@ pub struct PlayOutcome {
 pub enum PlayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// The policy was not ready, and no episode was played. A later attempt may succeed.
+    /// The policy was not ready, so no episode was played. A later attempt may succeed.
     #[error("{0}")]
     NotReady(String),
-    /// No policy is there that could play this episode, or any other.
+    /// The policy is absent, so it can play neither this episode nor any other.
     #[error("{0}")]
     Absent(String),
-    /// The episode was played, and its outcome is lost.
+    /// The episode was played, but its outcome is lost.
     #[error("{0}")]
     Lost(String),
 }
@@ -128,8 +129,8 @@ impl Policy for PlayerEntry {
     }
 }
 
-/// Plays `spec` in this process: `act` makes the calls. An episode that ends under way is no error. A panic
-/// is a failure of the policy, which ends this episode and no other.
+/// Plays `spec` in this process; `act` makes the calls. An episode that ends during a call is no error. A
+/// panic counts as a failure of the policy, and ends only this episode.
 pub fn play_in_process(
     spec: &EpisodeSpec,
     output: EpisodeOutput,
@@ -141,7 +142,7 @@ pub fn play_in_process(
         None => InProcess::new(session),
     };
     let acted = match episode.session.recording_failed() {
-        // A caller that wants a recording has no use for an unrecorded episode.
+        // A caller that requests a recording has no use for an unrecorded episode.
         Some(reason) => Err(PlayerError::GaveUp(reason.into())),
         None => catch_unwind(AssertUnwindSafe(|| act(&mut episode))).unwrap_or_else(|panic| {
             Err(PlayerError::Failed(format!("it panicked: {}", panic_text(&*panic))))

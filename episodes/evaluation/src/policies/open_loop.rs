@@ -1,5 +1,5 @@
-//! Replay of a demonstration's action rows in episodes of other seeds, without observations. It needs no
-//! perception. A policy that does not reach more phases has not shown any perception.
+//! Replay of a demonstration's action rows in episodes of other seeds. It needs no observations. A policy
+//! that does not reach more phases than this replay has not shown any perception.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,11 +18,11 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process};
 use crate::results::{EPISODES, OPEN_LOOP, PolicyCard};
 
-/// Number of demonstrations per task: the second serves the seed of the first.
+/// Number of demonstrations per task: the second is replayed for the seed of the first.
 const PER_TASK: usize = 2;
 
-/// A policy that sends all rows of recorded demonstrations, and then repeats the last row until the episode
-/// can no longer change.
+/// A policy that sends all rows of a recorded demonstration, then repeats the last row until the episode ends
+/// or all phases have been reached.
 #[derive(Debug)]
 pub struct OpenLoop {
     demonstrations: Vec<RecordedRows>,
@@ -59,12 +59,13 @@ pub enum OpenLoopError {
 }
 
 impl OpenLoop {
-    /// Reads a recording, or the first successful recordings of every task in a folder that `collect`
-    /// wrote.
+    /// Reads a recording, or the first successful recordings of every benchmark task in a folder that
+    /// `collect` wrote.
     ///
     /// # Errors
     ///
-    /// If the path cannot be read, has no recording of an episode, or has one that begins at a checkpoint.
+    /// If the path cannot be read, contains no recording of an episode, or contains one that begins at a
+    /// checkpoint.
     pub fn read(path: &Path) -> Result<OpenLoop, OpenLoopError> {
         if !path.is_dir() {
             return Ok(OpenLoop { demonstrations: vec![RecordedRows::read(path)?.0] });
@@ -78,7 +79,7 @@ impl OpenLoop {
                 }
                 chosen.push(RecordedRows::read(&path)?);
             }
-            // Failed recordings come last; they are used only without successful ones.
+            // Failed recordings come last; they are used only if there are too few successful ones.
             chosen.sort_by_key(|(_, succeeded)| !succeeded);
             demonstrations.extend(chosen.into_iter().take(PER_TASK).map(|(rows, _)| rows));
         }
@@ -88,7 +89,7 @@ impl OpenLoop {
         }
     }
 
-    /// Returns the rows to replay in an episode, never those recorded under its own seed.
+    /// Returns the rows to replay in an episode. They were never recorded under the episode's own seed.
     fn rows(&self, spec: &EpisodeSpec) -> Result<&RecordedRows, PlayError> {
         let of_task = self.demonstrations.iter().filter(|rows| rows.task == spec.task);
         let mut others = of_task.clone().filter(|rows| rows.seed != spec.seed);
@@ -134,7 +135,7 @@ fn recordings(folder: &Path, task: &Task) -> Result<BTreeMap<u32, PathBuf>, Open
 }
 
 impl RecordedRows {
-    /// Reads the rows of a recording, and whether its episode succeeded.
+    /// Reads the rows of a recording. Also returns `true` if its episode succeeded.
     fn read(path: &Path) -> Result<(RecordedRows, bool), OpenLoopError> {
         let bytes = read_bytes(path, MAX_RECORDING_BYTES)
             .map_err(|source| RecordingError::Read { path: path.into(), source })?;
@@ -144,8 +145,7 @@ impl RecordedRows {
         if *start != Start::Task {
             return Err(OpenLoopError::BeginsLater(path.into()));
         }
-        // The initial state, and the time that robots stood before the policy's turn, are no steps of the
-        // policy.
+        // The initial state, and the hold before the policy's first action, are not steps of the policy.
         let before = 1 + rules(*protocol, task).initial_hold_steps as usize;
         let robots = task.robots.len();
         let row = |step: Result<tandem_sim::Step, RecordingError>| {

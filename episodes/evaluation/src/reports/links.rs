@@ -1,9 +1,10 @@
-//! Links of reports: paths relative to the report's folder, which stay valid when folders are moved together.
+//! Links in reports: paths relative to the report's folder, which stay valid if the folders are moved
+//! together.
 
 use std::path::{Component, Path, PathBuf};
 
-/// Returns the link from a file in `folder` to `target`; `None` if either does not exist, or they are on
-/// different drives.
+/// Returns the link from a file in `folder` to `target`. Returns `None` if either does not exist, or they are
+/// on different drives.
 pub fn relative(folder: &Path, target: &Path) -> Option<String> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let (folder, target) = (folder.canonicalize().ok()?, target.canonicalize().ok()?);

@@ -1,4 +1,4 @@
-//! Pages for people: of evaluations, and of many runs.
+//! Reports for people: on evaluations, and on many runs.
 
 mod evaluation;
 mod leaderboard;

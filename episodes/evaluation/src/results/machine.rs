@@ -1,4 +1,4 @@
-//! The machine on which an episode was played or a value measured.
+//! The machine on which an episode was played or a value was measured.
 
 use std::{env::consts, fs, thread::available_parallelism};
 
@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 pub struct Machine {
     pub cpu: Option<String>,
     pub cores: Option<usize>,
-    /// Names of the system and of its kernel.
+    /// Names of the operating system and its kernel.
     pub os: String,
     pub architecture: String,
 }
 
 impl Machine {
-    /// Describes the machine on which this program runs, as far as Linux does.
+    /// Describes the machine on which this program runs, as far as Linux reports it.
     pub fn here() -> Machine {
         let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
         let name = value_of(&read("/etc/os-release"), "PRETTY_NAME", '=');
@@ -30,7 +30,7 @@ impl Machine {
     }
 }
 
-/// Returns the value in the first line `key = "value"`, with `sign` as the separator.
+/// Returns the value from the first line of the form `key = "value"`, with `sign` as the separator.
 fn value_of(text: &str, key: &str, sign: char) -> Option<String> {
     let line = |line: &str| {
         let (name, value) = line.split_once(sign)?;

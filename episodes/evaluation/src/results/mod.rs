@@ -19,16 +19,16 @@ pub use process_record::{PROCESSES_FILE, ProcessRecord, command_line};
 pub use seed_list::SeedList;
 pub use utc::utc_text;
 
-/// Name in results of the player that holds still.
+/// Name of the player that holds still, in results.
 pub const IDLE: &str = "idle";
 
-/// Name in results of the policy that replays a demonstration without observations.
+/// Name of the policy that replays a demonstration without observations, in results.
 pub const OPEN_LOOP: &str = "open-loop";
 
-/// Folder of single episodes in the folder of an evaluation.
+/// Name of the folder with single episodes, in the folder of an evaluation.
 pub const EPISODES: &str = "episodes";
 
-/// Folder of the evaluations under stress in the folder of an evaluation.
+/// Name of the folder with evaluations under stress, in the folder of an evaluation.
 pub const STRESS: &str = "stress";
 
 /// One played episode, as stored in its file.
@@ -57,7 +57,7 @@ pub struct PlayedEpisode {
     /// Earlier attempts at this episode, which did not count; the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attempts: Vec<Attempt>,
-    /// Time in UTC at which the episode ended; of a served episode, the time of its file. `None` in results
+    /// Time in UTC at which the episode ended; for a served episode, the time of its file. `None` in results
     /// of earlier builds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended_at: Option<String>,
@@ -77,8 +77,8 @@ pub struct Attempt {
     pub usage: Option<Usage>,
 }
 
-/// Reason why an episode is no evidence of its policy's performance. It is listed separately from failures,
-/// and the next run plays it again.
+/// Reason why an episode is not evidence of its policy's performance. Reports list these episodes separately
+/// from failures, and the next run plays them again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exclusion {
@@ -87,7 +87,7 @@ pub enum Exclusion {
 }
 
 impl Exclusion {
-    /// Returns the name in tables.
+    /// Returns the name that tables show.
     pub fn name(self) -> &'static str {
         match self {
             Exclusion::PolicyFailed => "policy failed",
@@ -97,7 +97,7 @@ impl Exclusion {
 }
 
 impl PlayedEpisode {
-    /// Returns every attempt at the episode, this one as the last.
+    /// Returns all attempts at the episode, with this one last.
     pub fn into_attempts(self) -> Vec<Attempt> {
         let PlayedEpisode { result, thought_s, note, mut attempts, .. } = self;
         let ResultReply { ended, phases, env_steps, tool_calls, usage, .. } = result;
@@ -105,8 +105,8 @@ impl PlayedEpisode {
         attempts
     }
 
-    /// Returns the index of the phase that the episode began at and that alone counts; `None` if it began
-    /// at the task's beginning.
+    /// Returns the index of the phase at which the episode began, which alone counts; `None` if the episode
+    /// began at the task's beginning.
     pub fn start_phase(&self) -> Option<usize> {
         self.spec.start_phase()
     }
@@ -116,8 +116,8 @@ impl PlayedEpisode {
         self.result.phases.reached_s(&Phase::number(phase)).is_some()
     }
 
-    /// Returns the extra information beyond the benchmark's own policies, without the part that the
-    /// assistance level implies.
+    /// Returns the information that the policy was shown and the benchmark withholds. Information that the
+    /// assistance level implies is left out.
     fn shown(&self) -> impl Iterator<Item = &String> {
         let is_said = |what: &&String| {
             let of_full = ExtraInformation::ALL.into_iter().filter(|kind| kind.is_of_full_assistance());
@@ -127,13 +127,14 @@ impl PlayedEpisode {
         asked.iter().chain(self.result.extra_information.iter().filter(move |what| !is_said(what)))
     }
 
-    /// Returns `true` if the phase that counts was reached: the one that the episode began at, or the last.
+    /// Returns `true` if the counted phase was reached: the phase at which the episode began, or else the
+    /// last one.
     pub fn succeeded(&self) -> bool {
         self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
     }
 
-    /// Returns the reason why the episode does not count; `None` if it counts. Phases reached before a
-    /// failure stay reached.
+    /// Returns the reason why the episode does not count; `None` if it counts. An episode that succeeded
+    /// before a failure counts.
     pub fn exclusion(&self) -> Option<Exclusion> {
         let failed = match self.result.ended {
             EndReason::PolicyFailed if self.keep_failed => None,
@@ -148,7 +149,7 @@ impl PlayedEpisode {
         failed.filter(|_| !self.succeeded())
     }
 
-    /// Returns the number of requests; results of earlier builds have only that of tool calls.
+    /// Returns the number of requests. Results of earlier builds contain only the number of tool calls.
     pub fn requests(&self) -> u32 {
         self.result.requests.unwrap_or(self.result.tool_calls)
     }
@@ -164,7 +165,7 @@ pub fn failures_of_policy(attempts: &[Attempt]) -> usize {
     attempts.iter().filter(|attempt| attempt.ended == EndReason::PolicyFailed).count()
 }
 
-/// Names of the built-in players, which act in the simulator's process and read no replies as text.
+/// Names of the built-in players. They act in the simulator's process and read no text replies.
 pub const PLAYERS: [&str; 4] = ["expert", "no_words", "idle", "demonstration"];
 
 /// Description of a policy in results. Episodes of policies with different cards are never mixed.
@@ -173,11 +174,11 @@ pub struct PolicyCard {
     /// The policy's name in results.
     #[serde(rename = "policy")]
     pub name: String,
-    /// Settings of how it is reached and driven that its name does not express.
+    /// Settings of the policy's connection and control that its name does not contain.
     #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
     pub settings: Option<Value>,
-    /// Extra information that the policy requests beyond the benchmark's own policies. The result, in the
-    /// same JSON object, lists under the plain name the information that was shown.
+    /// Extra information that the policy requests and the benchmark withholds. In the same JSON object, the
+    /// result lists the information that was shown, under the name without prefix.
     #[serde(rename = "policy_extra_information", default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
 }
@@ -189,20 +190,20 @@ impl PolicyCard {
     }
 }
 
-/// Returns a policy's name followed by the attributes that belong with it.
+/// Returns a policy's name, followed by its attributes.
 pub fn named(policy: &str, beside: &[String]) -> String {
     std::iter::once(policy.to_owned()).chain(beside.iter().map(|what| format!(" + {what}"))).collect()
 }
 
-/// Returns the extra information that the policy was shown in any of these episodes, for display after its
-/// name.
+/// Returns the extra information that the policy was shown in any of these episodes, for display after the
+/// policy's name.
 pub fn shown_in<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Vec<String> {
     let shown: BTreeSet<&String> = episodes.flat_map(PlayedEpisode::shown).collect();
     shown.into_iter().cloned().collect()
 }
 
 impl From<&str> for PolicyCard {
-    /// Creates the card of a policy known by name only.
+    /// Creates the card of a policy of which only the name is known.
     fn from(name: &str) -> PolicyCard {
         PolicyCard { name: name.into(), ..PolicyCard::default() }
     }
@@ -214,7 +215,8 @@ pub fn episode_note(result: &ResultReply, counts: Option<usize>) -> Option<Strin
     failed.or_else(|| missed_phase_note(result, counts))
 }
 
-/// Returns a note on the first phase that was not reached; if one phase counts, on that one.
+/// Returns a note on the first counted phase that was not reached. `counts` is the only counted phase, or
+/// `None` if all count.
 pub fn missed_phase_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
     let counted = |index: usize| counts.is_none_or(|only| only == index);
     let phases = result.phases.0.iter().enumerate();

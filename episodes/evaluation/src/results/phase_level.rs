@@ -1,6 +1,5 @@
-//! Phase-level rates: how often each phase was reached by episodes that began at that phase. They do not
-//! depend on earlier failures in a task, so phases that need several robots can be compared with the other
-//! phases.
+//! Phase-level rates: how often episodes that began at a phase reached that phase. These rates do not depend
+//! on earlier failures in a task, so phases that need several robots can be compared with other phases.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +13,20 @@ use super::PlayedEpisode;
 pub struct PhaseLevel {
     /// The rates in the order of the tasks and their phases.
     pub phases: Vec<PhaseRate>,
-    /// Means over the tasks of two robots, as in the benchmark.
+    /// Means over the tasks for two robots, as in the benchmark.
     #[serde(flatten)]
     pub two_robots: PhaseMeans,
-    /// Means over the tasks of three robots; `None` if none was played.
+    /// Means over the tasks for three robots; `None` if no such task was played.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub three_robots: Option<PhaseMeans>,
 }
 
-/// Means of phases' rates; every phase counts the same, however many episodes it has.
+/// Means of phases' rates. Every phase has the same weight, whatever its number of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseMeans {
-    /// Mean of the rates of phases that one robot works on at a time; `None` if there is none.
+    /// Mean of the rates of phases that need one robot at a time; `None` if there is no such phase.
     pub non_collaborative_share: Option<f64>,
-    /// Mean of the rates of phases on which robots work together.
+    /// Mean of the rates of phases on which robots collaborate.
     pub collaborative_share: Option<f64>,
     /// Relative drop from the first mean to the second, as a share of the first.
     pub drop_share: Option<f64>,
@@ -55,7 +54,7 @@ impl PhaseRate {
 }
 
 impl PhaseLevel {
-    /// Counts the episodes that began at a phase and count; `None` if there are none.
+    /// Counts the episodes that began at a phase and count; `None` if there are no such episodes.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<PhaseLevel> {
         let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
         let counted: Vec<&PlayedEpisode> = episodes.filter(|played| played.counts()).collect();
@@ -87,7 +86,7 @@ impl PhaseLevel {
         (!phases.is_empty()).then_some(PhaseLevel { phases, two_robots, three_robots })
     }
 
-    /// Returns the means by number of robots that were played.
+    /// Returns the means for each number of robots that was played.
     pub fn means(&self) -> Vec<(usize, &PhaseMeans)> {
         let two = self.phases.iter().any(|rate| rate.robots == 2).then_some((2, &self.two_robots));
         two.into_iter().chain(self.three_robots.iter().map(|means| (3, means))).collect()

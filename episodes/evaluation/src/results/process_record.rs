@@ -11,8 +11,8 @@ use tandem_episodes::{OutputError, shell_word};
 use super::machine::Machine;
 use super::utc::utc_text;
 
-/// Name of the file in a run's folder, with a line for each process. Processes add their line in one write,
-/// so several may begin at once.
+/// Name of the file in a run's folder that contains a line for each process. Processes append their line in
+/// one write, so several may start at once.
 pub const PROCESSES_FILE: &str = "processes.jsonl";
 
 /// A process that has played episodes of a run.
@@ -23,12 +23,12 @@ pub struct ProcessRecord {
     /// Version and fingerprint of the program.
     pub build: String,
     pub machine: Machine,
-    /// Time at which it began, in UTC.
+    /// Time at which the process began, in UTC.
     pub begun_at: String,
 }
 
 impl ProcessRecord {
-    /// Describes this process, which is of this build.
+    /// Describes this process, which runs this build.
     pub fn here(build: &str) -> ProcessRecord {
         ProcessRecord {
             command: command_line(),
@@ -38,7 +38,7 @@ impl ProcessRecord {
         }
     }
 
-    /// Adds the record to the file in `folder`.
+    /// Appends the record to the file in `folder`.
     ///
     /// # Errors
     ///
@@ -51,14 +51,16 @@ impl ProcessRecord {
             .map_err(|source| OutputError::Io { path, source })
     }
 
-    /// Reads the records in `folder`. A torn line is left out; without a file there are none.
+    /// Reads the records in `folder`. An incomplete line is skipped; if there is no file, there are no
+    /// records.
     pub fn read_all(folder: &Path) -> Vec<ProcessRecord> {
         let text = fs::read_to_string(folder.join(PROCESSES_FILE)).unwrap_or_default();
         text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
     }
 }
 
-/// Returns the command line of this process for a shell, with the program's name in place of its path.
+/// Returns the command line of this process, quoted for a shell, with the program's name in place of its
+/// path.
 pub fn command_line() -> String {
     in_shell(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }

@@ -1,11 +1,11 @@
-//! Times of the clock as text.
+//! Wall-clock times as text.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use chrono::{DateTime, SecondsFormat, Utc};
 
-/// Formats a time in UTC to the second according to RFC 3339, for example `2026-11-28T01:20:00Z`. Times
-/// before 1970 are formatted as its beginning.
+/// Formats a UTC time to the second according to RFC 3339, for example `2026-11-28T01:20:00Z`. Times before
+/// 1970 are formatted as the beginning of 1970.
 pub fn utc_text(time: SystemTime) -> String {
     DateTime::<Utc>::from(time.max(UNIX_EPOCH)).to_rfc3339_opts(SecondsFormat::Secs, true)
 }
@@ -16,7 +16,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks against `date -u -d @SECONDS`.
+    /// Compares with `date -u -d @SECONDS`.
     #[test]
     fn times_are_those_of_the_calendar() {
         for (seconds, expected) in [

@@ -1,5 +1,5 @@
-//! A first check of a robot's file: its parts, and whether it stands for a second; and drafts of
-//! descriptions.
+//! A first check of a robot's file: the parts that it has, and standing for one second. The module also
+//! drafts descriptions of robots.
 
 mod stand;
 
@@ -10,10 +10,10 @@ use tandem_sim::{RobotDraft, RobotModel, Side, SimError};
 
 use stand::stand;
 
-/// Findings about a robot that was read.
+/// Findings about a robot whose file was read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RobotCheck {
-    /// Parts that it lacks, with the consequences.
+    /// Parts that the robot lacks, with the consequences.
     pub lacks: Vec<String>,
     /// Reason why the robot does not stand for a second; `None` if it does.
     pub falls: Option<String>,
@@ -22,7 +22,7 @@ pub struct RobotCheck {
 /// Maximum displacement of a standing G1's pelvis in one second.
 const MAX_MOVED_M: f32 = 0.1;
 
-/// Checks a robot, and lets it stand for a second.
+/// Checks a robot, and simulates one second of standing.
 ///
 /// # Errors
 ///
@@ -74,7 +74,7 @@ fn lacks(model: &RobotModel) -> Vec<String> {
     lacks
 }
 
-/// Drafts the description of an MJCF file, which it names as `model_name`.
+/// Drafts the description for an MJCF file, to which the description refers as `model_name`.
 ///
 /// # Errors
 ///

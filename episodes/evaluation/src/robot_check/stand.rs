@@ -1,25 +1,25 @@
-//! A first trial of a robot: it stands for a second.
+//! A first trial of a robot: standing for one second.
 
 use std::sync::Arc;
 
 use tandem_sim::{RobotModel, RobotPlacement, SimError, World, WorldSpec};
 
-/// Outcome of a second of standing.
+/// Outcome of one second of standing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StandTrial {
     pub fallen: bool,
-    /// Distance by which the pelvis sank or rose, and moved aside.
+    /// Maximum displacement of the pelvis from its start, in any direction.
     pub moved_m: f32,
-    /// Joints of the legs that reached their limits of effort, with these limits in N m.
+    /// Leg joints that reached their effort limits, with these limits in N m.
     pub at_limit: Vec<(String, f32)>,
 }
 
-/// Control steps of the trial: a second.
+/// Number of control steps in the trial, which is one second.
 const STEPS: u32 = 50;
-/// Share of its effort from which a joint counts as at its limit.
+/// Share of its effort limit from which a joint counts as at the limit.
 const AT_LIMIT_SHARE: f32 = 0.98;
 
-/// Lets a robot stand on a floor for a second without commands.
+/// Simulates a robot that stands on a floor for one second without commands.
 ///
 /// # Errors
 ///

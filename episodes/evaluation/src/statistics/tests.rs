@@ -69,8 +69,8 @@ fn figures_are_those_of_scipy_and_statsmodels() {
     assert!(peers.clopper_pearson.len() > 10 && peers.pairs.len() > 8 && peers.mean.len() > 2);
 }
 
-/// Statistics with Confidence (Altman et al., 2000), table 6.2, where the first minus the second is 0.12,
-/// 0.01 to 0.23.
+/// Example from Statistics with Confidence (Altman et al., 2000), table 6.2. There, the first rate minus the
+/// second is 0.12, with an interval from 0.01 to 0.23.
 #[test]
 fn the_interval_of_a_paired_difference_is_the_textbooks() {
     let pairs = Pairs { both: 14, first_only: 5, second_only: 0, neither: 22 };

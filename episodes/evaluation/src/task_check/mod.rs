@@ -1,4 +1,4 @@
-//! Trial of a task before anyone plays it. The task's world is built and runs for some seconds without any
+//! Trial of a task before it is played. The task's world is built and simulated for two seconds without any
 //! action. The check lists all objects that fall and all phases that are reached, and renders the first image
 //! of each camera.
 
@@ -13,21 +13,21 @@ use tandem_episodes::{
 use tandem_sim::{CONTROL_HZ, RobotPress, Step};
 use tandem_tools_spec::Protocol;
 
-/// Length of the trial. It is longer than any fall from a table, and than the time after which an object
-/// counts as released.
+/// Length of the trial in control steps. It is longer than any fall from a table, and longer than the time
+/// after which an object counts as released.
 const TRIAL_STEPS: u32 = 100;
 /// Distance within which an object counts as staying in place.
 const STAYS_M: f32 = 0.03;
-/// Height below which robots stand on the floor.
+/// Height up to which contacts are those of feet on the floor.
 const FEET_M: f32 = 0.08;
 /// Angle within which an object counts as keeping its orientation.
 const STAYS_RAD: f32 = 0.1;
 
-/// Findings on a task in which nobody acts.
+/// Findings on a task in which no robot acts.
 #[derive(Debug, Default)]
 pub struct TaskCheck {
-    /// Objects and robots that do not stay where the task puts them, a line each, for the first seed that
-    /// shows it.
+    /// Objects and robots that move from their places in the task, a line each, for the first seed that shows
+    /// it.
     pub falls: Vec<String>,
     /// Observations that may be intended, a line each.
     pub notes: Vec<String>,
@@ -53,7 +53,8 @@ pub enum TaskCheckError {
     Output(#[from] OutputError),
 }
 
-/// Checks a task with each of these seeds. Renders the start of the first into `folder`, if one is given.
+/// Checks a task with each of these seeds. Renders the start of the first seed into `folder`, if one is
+/// given.
 ///
 /// # Errors
 ///
@@ -75,8 +76,8 @@ pub fn check_task(task: &Task, seeds: &[u32], folder: Option<&Path>) -> Result<T
     Ok(check)
 }
 
-/// Things that do not stay where they are put: the name, the description of the first case, and the number
-/// of seeds.
+/// Objects and robots that do not stay in place. Each has a name, the description of the first case, and the
+/// number of seeds.
 #[derive(Default)]
 struct Falls(Vec<(String, String, usize)>);
 
@@ -96,7 +97,7 @@ impl Falls {
         };
         self.0.into_iter().map(line).collect()
     }
-    /// Finds all objects that have moved from their places.
+    /// Finds all robots and objects that have moved from their places.
     fn find(
         &mut self,
         task: &Task,
@@ -132,7 +133,7 @@ impl Falls {
             let by_m = after.translation - before.translation;
             let turned_rad = before.rotation.angle_between(after.rotation);
             if by_m.length() > STAYS_M || turned_rad > STAYS_RAD {
-                // Adding zero makes the zero of tiny negative values a positive one.
+                // Adding zero turns the negative zero of tiny negative values into a positive one.
                 let round = |value: f32| (value * 100.0).round() / 100.0 + 0.0;
                 let place = |place: [f32; 3]| {
                     let [x_m, y_m, z_m] = place.map(round);
@@ -153,7 +154,7 @@ impl Falls {
     }
 }
 
-/// Describes the first obstacle of a robot.
+/// Describes the first obstacle that a robot touches.
 fn told_press(press: &RobotPress) -> String {
     let RobotPress { link, on, at_m } = press;
     let on = on.as_ref().map_or("the room".into(), |on| format!("{on:?}"));
@@ -191,8 +192,8 @@ impl TaskCheck {
         Ok(())
     }
 
-    /// Notes the seed's choices that a robot's operator can read, although its own instruction does not
-    /// contain them.
+    /// Notes texts that reveal the seed's choices to a robot's operator although that robot's instruction
+    /// does not contain them.
     fn note_secrets(&mut self, task: &Task) {
         let ways = task.variants();
         let chosen =
@@ -223,7 +224,7 @@ impl TaskCheck {
         self.note_rewordings(ways, [&told, &kept]);
     }
 
-    /// Notes rewordings that reveal the seed's choices to other robots than the task's own wording does.
+    /// Notes rewordings that do not reveal the seed's choices to the same robots as the task's own wording.
     fn note_rewordings(&mut self, ways: &[TaskDefinition], [told, kept]: [&[usize]; 2]) {
         let levels = ways[0].rewordings.as_ref().map_or(0, |levels| levels.len());
         for level in 0..levels {
@@ -275,7 +276,7 @@ impl TaskCheck {
     }
 }
 
-/// Returns `true` if a phase would be reached immediately, were it next.
+/// Returns `true` if the phase would be reached immediately if it were the next one.
 fn holds(done: &Done, facts: &Facts) -> bool {
     match done {
         Done::When(condition) => condition.holds(facts),

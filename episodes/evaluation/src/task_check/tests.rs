@@ -1,10 +1,10 @@
-//! Tests of checked tasks: objects at rest, objects that fall, and phases that need no action.
+//! Tests of checked tasks: objects at rest, falling objects, and phases that need no action.
 
 use tandem_episodes::tasks::{TaskSource, task_of};
 
 use super::*;
 
-/// Returns a task with a box on the floor, one robot, and phases of these conditions.
+/// Returns a task with a box on the floor, one robot, and two phases with these conditions.
 fn task(z_m: f32, conditions: [&str; 2]) -> Task {
     let [first, second] = conditions;
     let text = format!(

@@ -19,7 +19,7 @@ const THUMB_LEVER_M: f32 = 0.06;
 const WITHIN_PART: f32 = 0.5;
 /// Joint speed above which a finger works against its own inertia and damping.
 const MOVES_RAD_S: f32 = 0.5;
-/// Maximum distance of touching shapes.
+/// Maximum distance at which two shapes count as touching.
 const NEAR_M: f32 = 0.004;
 /// Joints in the order of `move_wrists`.
 const THUMB: Range<usize> = 0..3;

@@ -33,14 +33,14 @@ const TOUCHED_N: f32 = 3.0;
 /// Tolerance within which free fingers reach their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
-/// Returns the grip of a hand, as its own drives feel it.
+/// Returns the grip of a hand, as sensed by the torques of its drives.
 pub fn grip(side: Side, sensed: &RobotSensed, motion: &Motion) -> Grip {
     feel::felt(side, sensed, &motion.robot.model).grip
 }
 
 /// Returns the report on an order. `clamped` are its clamped values, `sensed` are the robot's readings after
-/// the order, and `began` is the pelvis before the order by odometry. Wrist poses are in the frame of the
-/// latest wrist targets.
+/// the order, and `began` is the pelvis pose before the order by odometry. Wrist poses are in the frame of
+/// the latest wrist targets.
 pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Motion) -> RobotReport {
     let (robot, frame) = (&motion.robot, motion.state().frame);
     RobotReport {
@@ -131,7 +131,7 @@ fn wrist_poses(side: Side, wrist: &WristPoses, sensed: &RobotSensed, motion: &Mo
     [target, isometry_from_sim(&sensed.pelvis_from_wrist[side])]
 }
 
-/// Converts the target and the measured pose of a wrist to those of a report in `frame`.
+/// Converts the target and the measured pose of a wrist to the report's poses in `frame`.
 fn wire_wrists(poses: [Isometry3<f64>; 2], frame: PoseFrame, motion: &Motion) -> [WirePose; 2] {
     let frame_from_pelvis = motion.pelvis_from(frame).inverse();
     let [target, mut measured] = poses.map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));

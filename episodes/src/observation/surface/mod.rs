@@ -1,7 +1,7 @@
 //! Surfaces in an image: the connected region of similar colour at a pixel, the object at a pixel, or the
 //! nearest surfaces of a colour. They are found from colours and depth that the policy may see itself,
-//! without knowledge of the object to which a pixel belongs; only the surface of an object by its name uses
-//! that knowledge.
+//! without knowledge of the object to which a pixel belongs. Only a query for an object by name uses that
+//! knowledge.
 
 mod round;
 mod thing;
@@ -45,7 +45,8 @@ pub struct CameraPoses {
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Returns the visible surfaces of these objects, each given by its ids, with its index in the list.
+/// Returns the visible surfaces of these objects, each with its object's index in `things`. An object is
+/// given by its ids.
 pub fn of_things(view: &RobotView, things: &[BTreeSet<u32>], poses: &CameraPoses) -> Vec<(usize, Surface)> {
     let relief = Relief::of(view);
     let surface = |(index, ids): (usize, &BTreeSet<u32>)| {

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 /// Height of a slice, and minimum number of points in it.
 const SLICE_M: f64 = 0.01;
 const MIN_POINTS: usize = 5;
-/// Limits for a slice to be an arc: maximum distance of its points from the circle, also as a fraction of
-/// the radius; minimum angle of the arc; and the range of radii.
+/// Limits for a slice to be an arc: maximum distance of its points from the circle, also as a fraction of the
+/// radius; minimum angle of the arc; range of radii.
 const OFF_M: f64 = 0.002;
 const OFF_PART: f64 = 0.06;
 const MIN_ARC_RAD: f64 = 1.2;
@@ -81,7 +81,7 @@ fn arc(points_m: &[Vector2<f64>], eye_m: &Vector2<f64>) -> Option<Circle> {
     let off_m =
         points_m.iter().map(|point_m| ((point_m - middle_m).norm() - radius_m).abs()).fold(0.0, f64::max);
     let is_round = RADII_M.contains(&radius_m) && off_m < OFF_M.min(OFF_PART * radius_m);
-    // The near side of an object is visible, but the far side of a hollow.
+    // An object shows its near side, a hollow its far side.
     let stands_out = (middle_m - eye_m).norm() > (mean_m - eye_m).norm();
     let towards = (eye_m - middle_m).normalize();
     let angles_rad = points_m.iter().map(|point_m| {

@@ -1,6 +1,6 @@
-//! The object at a pixel, whatever its colours: the region connected to it by continuous depth, across
-//! convex edges but not across concave corners, such as that with a table below. After Stein et al.,
-//! "Object partitioning using local convexity", 2014.
+//! The object at a pixel, whatever its colours: the region connected to it by continuous depth, across convex
+//! edges. The region does not extend across concave corners, for example where the object meets a table.
+//! After Stein et al., "Object partitioning using local convexity", 2014.
 
 use std::collections::BTreeSet;
 

@@ -110,7 +110,7 @@ fn pages_tell_what_happened() {
         &["3 of 3 phases reached", "500 of 1000", "<span>0 s</span><span>10.00 s</span>"],
         &["not reached", "Policy's own time", "initial hold"],
     );
-    // A phase that was reached before the start is not part of it.
+    // A phase that was reached before the start is not shown in the timeline.
     check(
         &page_from(6.5, [Some(4.0), Some(8.5), None], Protocol::Benchmark),
         &[
@@ -152,7 +152,7 @@ fn pages_load_nothing_and_escape_what_they_quote() {
     assert!(!page.contains("<link") && !page.contains("url(") && !page.contains("src=\"http"));
 }
 
-/// Cells with long texts become lines of their own where there is no room for columns.
+/// Cells with long texts become separate lines if there is no room for columns.
 #[test]
 fn no_table_of_words_needs_more_room_than_a_telephone_has() {
     let page = page([Some(4.0), None, None], Protocol::Agentic);

@@ -18,7 +18,7 @@ const WALK_M_S: f32 = 0.35;
 /// than `STANDS_M_S`.
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
-/// Number of commands that A waits at most for the trolley to stand.
+/// Maximum number of commands for which A waits for the trolley to stop.
 const MAX_STOPPING_BEATS: u32 = 20;
 /// Speed at which B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
@@ -29,7 +29,7 @@ const LIFT_M: f32 = 0.26;
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// Tolerance on the way back, where B already turns.
+/// Tolerance for the waypoint on the way back, at which B already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
 /// Height over the patch at which B lets go of the bottle.
 const DROP_M: f32 = 0.003;

@@ -20,7 +20,7 @@ const TAKER: CylinderGrasp =
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
 
-/// Hands the bottle over. The steps before the robot's hold are skipped if a robot already has the bottle.
+/// Hands the bottle over. If a robot already holds the bottle, the steps before that are skipped.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     if !TAKER.holds(commander)? {
         if !GIVER.holds(commander)? {

@@ -14,25 +14,26 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
 
 const LIFT_M: f32 = 0.07;
-/// Height of the pelvises over the floor while the robots take the legs and set them down. `TALL_M` is the
-/// height while they hold the table aloft. A walking robot's pelvis is below 0.68 m whatever is commanded.
+/// Height of the pelvises above the floor while the robots grasp the legs and set the table down. `TALL_M` is
+/// the height while they hold the table aloft. The pelvis of a walking robot is below 0.68 m whatever is
+/// commanded.
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.27;
-/// Distance from the wrist to the part that presses, in a fist with its palm down. `FRONT_M` is the distance
-/// to the fist's front.
+/// Distance from the wrist to the pressing part of a fist, palm down. `FRONT_M` is the distance to the fist's
+/// front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
-/// Distance behind the lever at which the fist closes. The wrist then rises `ABOVE_LEVER_M` over the
-/// lever's end and goes down by the steps of `DOWN_M` until the bolt is drawn.
+/// Distance behind the lever at which the fist closes. The wrist then rises `ABOVE_LEVER_M` above the lever's
+/// end and goes down in steps of `DOWN_M` until the bolt is drawn.
 const BACK_M: f32 = 0.10;
 const ABOVE_LEVER_M: f32 = 0.11;
 const DOWN_M: [f32; 4] = [-0.02, -0.05, -0.08, -0.11];
 /// Travel of a drawn bolt. The bolt reaches 20 mm into its hole.
 const DRAWN_M: f32 = 0.022;
-/// Position of the leaf's face, towards the robot that pushes, and distances from the hinge at which it
-/// pushes. The first is beside the lever. The last is farther in, so that the robot passes through the
-/// middle of the doorway.
+/// x coordinate of the leaf's face on the robot's side, in the leaf's frame, and distances from the hinge at
+/// which the robot pushes. The first is beside the lever. The last is nearer to the hinge, so that the robot
+/// passes through the middle of the doorway.
 const FACE_X_M: f32 = -0.045;
 const FIRST_RADIUS_M: f32 = 0.785;
 const LAST_RADIUS_M: f32 = 0.50;
@@ -51,9 +52,9 @@ const OPENED_S: f32 = 0.4;
 /// Distance that B keeps behind A until A is out of the way.
 const APART_M: f32 = 0.75;
 const BESIDE_Y_M: f32 = -0.75;
-/// Position of A while it presses the lever, door frame.
+/// Position of A while it presses the lever, in the door's frame.
 const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
-/// Position of A beside its partners' way, door frame.
+/// Position of A beside its partners' path, in the door's frame.
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
 /// Maximum speed of A on its way to the lever, and to its place aside.
 const APPROACH_M_S: f32 = 0.4;
@@ -161,8 +162,8 @@ fn fist_at(end_m: Vector, back_m: f32, above_m: f32) -> HandMove {
     HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
 }
 
-/// Returns A's place on the floor and its right wrist at `height_m` that push the leaf, shut at `shut`, to
-/// an angle.
+/// Returns A's place on the floor, and the pose of its right wrist at `height_m`, with which it pushes the
+/// leaf to an angle. `shut` is the pose of the shut leaf.
 fn push(shut: &Pose, angle_rad: f32, height_m: f32) -> (Pose, Pose) {
     let share = (angle_rad / MOVED_IN_RAD).min(1.0);
     let radius_m = FIRST_RADIUS_M + (LAST_RADIUS_M - FIRST_RADIUS_M) * share;

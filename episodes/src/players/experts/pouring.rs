@@ -24,7 +24,7 @@ const GLASS_PLACE_M: Vector = Vector::new(0.40, 0.0, 0.86);
 const ABOVE_MOUTH_M: Vector = Vector::new(0.0, 0.0, 0.03);
 const BEFORE_TIPPING_M: Vector = Vector::new(0.0, -0.04, 0.10);
 const TIP_RAD: f32 = 2.0;
-/// Further tip for a marble that stays in the cup, up to `DEEPEST_RAD`, the limit of the wrist.
+/// Additional tip angle if the marble stays in the cup, up to `DEEPEST_RAD`, the limit of the wrist.
 const MORE_RAD: f32 = 0.2;
 const DEEPEST_RAD: f32 = 2.6;
 /// Number of straight moves that make up the tip.

@@ -1,5 +1,5 @@
-//! The TableAlign expert: both robots take the edges, lift, and carry the table down the room while they
-//! turn it by a quarter. They come at the chair from its front and from one side, set down and let go.
+//! The TableAlign expert: both robots take the edges, lift, and carry the table down the room while they turn
+//! it by a quarter. They approach the chair from its front and from one side, set the table down and let go.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

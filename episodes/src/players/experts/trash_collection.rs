@@ -11,8 +11,8 @@ use super::skills::{
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// Height of the pelvis over the floor while A takes the bin; `TALL_M` is the height while A stands and holds
-/// it. A walking robot's pelvis is below 0.68 m whatever is commanded.
+/// Height of the pelvis above the floor while A grasps the bin; `TALL_M` is the height while A stands and
+/// holds it. The pelvis of a walking robot is below 0.68 m whatever is commanded.
 const BENT_M: f32 = 0.68;
 const TALL_M: f32 = 0.72;
 /// Lift after which the bin's rim is a little lower than the bench's top.

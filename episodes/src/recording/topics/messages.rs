@@ -84,7 +84,7 @@ impl StepMessage {
     }
 }
 
-/// The 35 numbers one robot was commanded for one control step; the channel's metadata names the columns.
+/// Command of one robot for one control step, 35 numbers; the channel's metadata names the columns.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Action")]
 pub struct ActionMessage {
@@ -141,7 +141,8 @@ impl From<&RobotCommand> for Json<BaseCommandMessage> {
     }
 }
 
-/// Grip of a robot's hands: forces of the world on them (world frame), estimated from the arms' torques.
+/// Hands of a robot: forces of the world on them (world frame), estimated from the arms' torques, and objects
+/// that they hold or touch.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Hands")]
 pub struct HandsMessage {
@@ -244,7 +245,7 @@ impl<'a> CallOutcome<'a> {
         !matches!(self, CallOutcome::Problem(_))
     }
 
-    /// Returns the outcome as text. Images have topics of their own and would make this one unreadable.
+    /// Returns the outcome as text. Images have separate topics, and would make this one unreadable.
     fn text(&self) -> Result<String, serde_json::Error> {
         match self {
             CallOutcome::Reply(reply) => serde_json::to_string(reply),
@@ -286,7 +287,7 @@ pub enum CallerRecord<'a> {
     /// The operator of this robot, which is shown the reply.
     Operator(&'a str),
     /// A caller that executes the decisions of a policy in this process. The policy itself is shown this
-    /// extra information of every observed robot, beyond the benchmark's own policies.
+    /// information about every observed robot, which the benchmark withholds from its policies.
     InProcess(&'a [ExtraInformation]),
 }
 
@@ -374,8 +375,8 @@ impl ToolCallRecord {
         Ok(ToolCallRecord { time_s: at.time_s, message, pictures })
     }
 
-    /// Creates the record of a request that is no call of the episode, with its raw arguments: a plan, or a
-    /// call that was refused before it reached the episode.
+    /// Creates the record of a request that is no call of the episode, with its raw arguments. This is a
+    /// plan, or a call that was refused before it reached the episode.
     pub fn beside(
         at: CallMoment,
         caller: CallerRecord,
@@ -405,8 +406,7 @@ impl ToolCallRecord {
     }
 }
 
-/// A picture that a call showed: what the robot's camera saw after this many control steps, which its topic
-/// has.
+/// An image shown by a call: the robot's camera after the call's control steps, stored in the camera's topic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShownPicture {
     pub robot: String,
@@ -418,33 +418,33 @@ fn counted() -> bool {
     true
 }
 
-/// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.
+/// A tool call and its answer. Arguments and reply are JSON texts, since they differ between tools.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ToolCallMessage {
     pub tool: String,
-    /// Control steps made when it was answered.
+    /// Number of control steps before the reply.
     #[serde(default)]
     pub control_step: u64,
-    /// Thinking time of the policy since the episode began, this call's own included.
+    /// Thinking time of the policy since the episode began, including that before this call.
     pub thought_ns: u64,
     pub arguments: String,
-    /// The robot whose operator made the call; absent where one policy directs all.
+    /// The robot whose operator made the call; absent if one policy directs all robots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub operator: Option<String>,
-    /// Information beyond the benchmark's own policies that was shown to a policy asked in the simulator's
-    /// process; absent where the policy was shown the whole reply.
+    /// Information shown to a policy in the simulator's process that the benchmark withholds; absent if the
+    /// policy was shown the whole reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Vec<String>")]
     pub shown: Option<Vec<String>>,
-    /// True for a call of the episode, which counts and which a replay makes again. A call that was refused
-    /// before it reached the episode is none, and neither is a plan, which follows its commands.
+    /// True for a call of the episode, which counts and which a replay repeats. False for a call refused
+    /// before it reached the episode, and for a plan, which follows its commands.
     #[serde(default = "counted")]
     pub counted: bool,
     pub ok: bool,
-    /// The reply without pictures, or the text of the problem.
+    /// The reply without images, or the text of the problem.
     pub reply: String,
-    /// Views that it showed, one for each robot.
+    /// Images shown, one for each robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pictures: Vec<ShownPicture>,
 }

@@ -8,28 +8,27 @@ use tandem_tools_spec::{AgentEnding, Note, NoteKind, TokenCount};
 
 use super::messages::{CallMoment, JsonMessage};
 
-/// A note on the episode. What it does not say is left out.
+/// A note on the episode. Unknown values are omitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NoteMessage {
     pub text: String,
     /// `thought`, `message` or `note`.
     #[schemars(with = "String")]
     pub kind: NoteKind,
-    /// Number of messages on `/tool_calls` by then: the note belongs to what comes next.
+    /// Number of messages on `/tool_calls` before the note; the note belongs to the next one.
     pub calls_before: u32,
-    /// Control steps made by then.
+    /// Number of control steps before the note.
     pub control_step: u64,
-    /// Thinking time of the policy by then since the episode began.
+    /// Thinking time of the policy before the note, since the episode began.
     pub thought_ns: u64,
-    /// The robot that it is about; absent where it is about all.
+    /// The robot that the note is about; absent if it is about all robots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub robot: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub model: Option<String>,
-    /// Tokens that the model read, those from a cache included; absent, as the next two, where none were
-    /// counted.
+    /// Tokens that the model read, including cached ones; absent, like the next two, if not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "u32")]
     pub input_tokens: Option<u32>,
@@ -43,11 +42,11 @@ pub struct NoteMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub usd: Option<f64>,
-    /// Seconds that the model took.
+    /// Duration of the model's computation in seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub seconds: Option<f64>,
-    /// End of the model's play; absent where it went on.
+    /// End of the model's play; absent if it continued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub ending: Option<AgentEnding>,

@@ -110,8 +110,8 @@ impl RobotTopics {
         file.write(topic, time_s, &Json::from(setpoints))
     }
 
-    /// Appends an image from the robot's head camera, unless there is already one of this moment. Between
-    /// commands the simulation pauses, so images do not change.
+    /// Appends an image from the robot's head camera, unless an image of the same moment has been appended.
+    /// Between commands the simulation pauses, so images do not change.
     pub fn picture(
         &mut self,
         file: &mut McapFile,

@@ -17,7 +17,7 @@ use tandem_sim::{
 
 use super::transforms::{quaternion, timestamp, vector3};
 
-/// Side of the square as which a plane without extent is drawn.
+/// Side length of the square drawn for a plane without extent.
 const ENDLESS_PLANE_M: f32 = 20.0;
 const PLANE_THICKNESS_M: f32 = 0.001;
 /// Types of numbers in glTF, and the size of the head of a binary file.
@@ -86,7 +86,8 @@ fn triangles(pose: Pose, points_m: &[Vector], corners: &[[u32; 3]], color: Color
     }
 }
 
-/// Returns a mesh as glTF. A list of triangles has twice the bytes, and takes more than twice as long to write.
+/// Returns a mesh as glTF. A list of triangles has twice the bytes, and takes more than twice as long to
+/// write.
 fn model(pose: Pose, mesh: &Mesh, color: Color) -> ModelPrimitive {
     ModelPrimitive {
         pose: Some(foxglove_pose(pose)),

@@ -1,6 +1,6 @@
 //! Encoding of recorded steps, bit for bit. Each number is written as its difference from a prediction by
-//! the steps before. The bytes of all differences are sorted by significance, so that those that are mostly
-//! zero are together.
+//! earlier steps. The bytes of all differences are sorted by significance, so that bytes that are mostly zero
+//! are together.
 
 use std::collections::VecDeque;
 
@@ -21,8 +21,8 @@ const JSON: u8 = b'{';
 const HEADER_BYTES: usize = 1 + 2 * size_of::<u64>();
 /// Number of earlier steps that predict the next.
 const REMEMBERED: usize = 3;
-/// Step number from which steps are written plainly: as a number of variable length it could be taken for a
-/// word of four bytes.
+/// Step number from which steps are written plainly. As a number of variable length, it could be mistaken for
+/// a word of four bytes.
 const MAX_STEPS: u64 = 1 << 21;
 
 /// Description of these messages for readers that do not know Tandem.
@@ -201,7 +201,7 @@ pub fn state_of(row: &[u8]) -> Result<(u64, String), StepError> {
     Ok((step, state_hash_text(hash)))
 }
 
-/// Postcard's bytes, with words of four bytes apart from all others.
+/// Postcard's bytes, with words of four bytes separated from all others.
 #[derive(Default)]
 struct Split {
     words: Vec<u32>,

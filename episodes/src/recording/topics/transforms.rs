@@ -62,8 +62,8 @@ fn link_poses<'a>(
     })
 }
 
-/// Rounds a number for display to the nearest multiple of `2^-binary_digits`. The digits behind it compress
-/// badly, and no sensor has them; steps hold every bit.
+/// Rounds a number for display to the nearest multiple of `2^-binary_digits`. Further digits compress badly,
+/// and no sensor resolves them; steps hold every bit.
 pub fn rounded(value: f32, binary_digits: u8) -> f64 {
     let ones = f64::from(1u32 << binary_digits);
     (f64::from(value) * ones).round() / ones

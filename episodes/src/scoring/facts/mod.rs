@@ -18,7 +18,7 @@ pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
 pub struct Facts {
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// One per robot, A first.
+    /// Facts about each robot, A first.
     pub robots: Vec<RobotFacts>,
     pub objects: Vec<ObjectFacts>,
 }
@@ -28,12 +28,12 @@ pub struct Facts {
 pub struct RobotFacts {
     /// Its shapes.
     pub model: Arc<RobotModel>,
-    /// Every link, in the order of [`RobotModel::links`].
+    /// Pose of every link, in the order of [`RobotModel::links`].
     pub world_from_link: Vec<Pose>,
     pub pelvis_in_world: Pose,
     pub wrist_in_pelvis: Sides<Pose>,
     /// Force of the world on each palm, in the world's frame, estimated from the arm's own torques. A hand
-    /// that holds 0.5 kg reads -4.9 N along z; one in quick motion also reads its own inertia.
+    /// that holds 0.5 kg reads -4.9 N along z. A hand in fast motion also reads its own inertia.
     pub hand_force_n: Sides<Vector>,
     pub fallen: bool,
 }
@@ -96,8 +96,8 @@ impl Facts {
         object.pose_in_world.translation.z - object.rest_height_m
     }
 
-    /// Returns the height of the lowest point of `object` above the rest height of its origin at the start
-    /// of the episode. For an object that stood upright, this is the clearance of all of it over its
+    /// Returns the height of the lowest point of `object` above the rest height of its origin at the start of
+    /// the episode. For an object that stood upright, this is the clearance of the whole object above its
     /// support.
     pub fn clearance_m(&self, object: &str) -> f32 {
         self.lowest_m(object) - self.object(object).rest_height_m
@@ -133,7 +133,7 @@ impl Facts {
         up_in_world.angle_between(Vector::Z)
     }
 
-    /// Returns how far the hinge (rad) or the slide (m) of `object` has moved from its pose in the file.
+    /// Returns the displacement of the hinge (rad) or slide (m) of `object` from its pose in the file.
     pub fn opened(&self, object: &str) -> f32 {
         self.object(object).opened_value.unwrap_or_default()
     }
@@ -156,12 +156,12 @@ impl Facts {
         (self.position_m(object) - self.position_m(other)).truncate().length()
     }
 
-    /// Returns the position of the origin of `object` in the frame of another.
+    /// Returns the position of the origin of `object` in the frame of another object.
     pub fn seen_from_m(&self, frame: &str, object: &str) -> Vector {
         self.object(frame).pose_in_world.inverse() * self.position_m(object)
     }
 
-    /// Returns the rotation of `object` about the vertical relative to another, from -pi to pi.
+    /// Returns the rotation of `object` about the vertical relative to another object, from -pi to pi.
     pub fn turned_rad(&self, frame: &str, object: &str) -> f32 {
         let [frame, object] = [frame, object].map(|name| self.object(name).pose_in_world.rotation);
         let x = frame.inverse() * (object * Vector::X);

@@ -23,7 +23,7 @@ impl<F: Fn(&Facts) -> bool + Send + Sync> Predicate for F {
     }
 }
 
-/// Function that returns how near something is, from 0 to 1.
+/// Function that returns a nearness, from 0 to 1.
 pub type Nearness = Arc<dyn Fn(&Facts) -> f32 + Send + Sync>;
 
 /// One scored phase.

@@ -112,7 +112,7 @@ fn objects_in_place(task: &Task) -> Facts {
     let apples = ["apple_1", "apple_2", "apple_3", "apple_4", "apple_5", "apple_6"];
     let at = |x_m: f32, y_m: f32, z_m: f32| Pose::from_translation(Vector::new(x_m, y_m, z_m));
     let turned = |by_rad: f32| Pose::from_rotation(Rotation::from_rotation_z(by_rad));
-    // Object, another one, and the first one's place in the other's frame.
+    // Object, reference object, and the object's pose in the frame of the reference object.
     let moves: Vec<(&str, &str, Pose)> = match task.id.as_str() {
         "handover" => vec![("bottle", "target_pad", at(0.0, 0.0, 0.0))],
         "pouring" => vec![("marble", "glass", at(0.0, 0.0, 0.02))],

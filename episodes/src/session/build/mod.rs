@@ -83,7 +83,7 @@ pub fn build_world(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     Ok(Built { world, motions, robot: spec.robot.identity(), locomotion: locomotion.name() })
 }
 
-/// Returns the pose of the first robot's start frame in that of robot number `index`.
+/// Returns the pose of the first robot's start frame in the start frame of robot number `index`.
 fn start_from_room(robots: &[RobotPlacement], index: usize) -> Isometry3<f64> {
     let start = |robot: &RobotPlacement| {
         let [x_m, y_m] = robot.position_m;
@@ -104,7 +104,7 @@ fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
     }
 }
 
-/// Adds the distractors of the stress. Their places depend on those of everything else.
+/// Adds the distractors of the stress. Their places depend on the places of all other objects.
 fn add_distractors(
     spec: &EpisodeSpec,
     world_spec: &mut WorldSpec,

@@ -13,7 +13,8 @@ use crate::tasks::{SceneFile, Spread, Task};
 
 /// Duration of a trial.
 const TRIAL_STEPS: u32 = 50;
-/// Maximum displacement of robots and objects at its end, and the displacement that ends it at once.
+/// Maximum displacement of robots and objects at the end of a trial, and the displacement that ends a trial
+/// at once.
 const STAYS_M: f32 = 0.03;
 const GONE_M: f32 = 0.1;
 /// Maximum number of passed trials that a process remembers; the latest are kept.
@@ -32,8 +33,8 @@ struct Tried {
 
 static PASSED: Mutex<Vec<Tried>> = Mutex::new(Vec::new());
 
-/// Checks that a scene from a file has what the task needs, by a short trial with idle robots. A trial that has
-/// passed is not repeated.
+/// Checks that a scene from a file has what the task needs, by a short trial with idle robots. A trial that
+/// has passed is not repeated.
 pub(super) fn try_scene(
     spec: &EpisodeSpec,
     world_spec: &WorldSpec,

@@ -1,11 +1,11 @@
-//! `walk_to` for robots that push or carry: bases and hands follow one path from rest to rest, each
-//! robot's in its own start frame.
+//! `walk_to` for robots that push or carry: bases and hands follow one path from rest to rest. Each robot's
+//! path is in that robot's start frame.
 //!
 //! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid body.
-//! Robots that hold one load, with places that fit it, thus move as one body with the load. They need no
-//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place, which
-//! are those of the first step. So an error of the base does not carry over to the next leg. Robots walk half
-//! a second behind their commands, so base commands are ahead of the planned places by that time.
+//! Robots that hold one load, with places that fit it, thus move as one body with the load, without
+//! information about each other's poses. The wrists keep the poses relative to the robot's planned place that
+//! they had at the first step. An error of the base therefore does not carry over to the next leg. Robots
+//! walk half a second behind their commands, so base commands are ahead of the planned places by that time.
 
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
@@ -23,8 +23,9 @@ use crate::commands;
 use crate::convert::isometry_from_sim;
 use crate::session::Session;
 
-/// The path slows down for a robot that lags by the first distance, and waits at the second. It is given
-/// up after waiting for this many commands. The angles apply to robots turned away from the path.
+/// Progress along the path slows down for a robot that lags by the first distance, and stops at the second.
+/// The path is given up after waiting for this many commands. The angles apply to robots turned away from the
+/// path.
 const LAG_M: [f64; 2] = [0.13, 0.18];
 const LAGS_COMMANDS: u32 = 16;
 const TURNED_RAD: [f64; 2] = [0.12, 0.2];
@@ -50,7 +51,7 @@ struct Carrier {
     name: String,
     robot: usize,
     carries: bool,
-    /// Hands that go along: those with a wrist target or a grip. The arms of the others keep their joints.
+    /// Hands that move along: those with a wrist target or a grip. The other arms keep their joints.
     hands: Sides<bool>,
     ways: Vec<Way>,
     /// Fixed wrist poses in the frame of the robot's planned place.
@@ -70,7 +71,8 @@ enum CarryStage {
     OnWay,
     /// Corrections at the end of the path, with the number of commands made.
     Correcting(u32),
-    /// Standing, with the number of commands made, and the number of the latest in which all stood.
+    /// Standing, with the number of commands made, and the number of consecutive ones up to now with all
+    /// robots standing.
     Resting {
         commands: u32,
         calm: u32,

@@ -39,7 +39,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// A command that cannot be executed; the plan is then refused as a whole.
+    /// If a command cannot be executed. The plan is then refused as a whole.
     pub(super) fn command_list(
         &self,
         plan: &SendPlan,
@@ -76,7 +76,8 @@ impl Session {
         Ok(CommandList { steps, index: 0, begun: 0, current: None, operator, until_heard: plan.until_heard })
     }
 
-    /// Checks that conditions on other operators are those of an operator, and name another one.
+    /// Checks that only an operator's plan has conditions on other operators, and that each names another
+    /// operator.
     fn check_partners(&self, step: &PlanStep, operator: Option<&str>) -> Result<(), String> {
         let Some(condition) = step.expects.names_partners() else { return Ok(()) };
         let own =
@@ -158,7 +159,7 @@ impl CommandList {
         self.last_begun().map_or(SendPlan::NAME, |step| step.call.name())
     }
 
-    /// Returns true while this wrist has not had its last target in the present command.
+    /// Returns true while this wrist has not received its last target in the present command.
     pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
         matches!(&self.current, Some(CurrentCommand::Until(pieces)) if pieces.is_under_way(robot, side))
     }

@@ -14,20 +14,20 @@ use crate::scoring::Phase;
 pub struct PartnerNews {
     /// Robots whose operators have sent a message.
     pub heard: BTreeSet<String>,
-    /// True if all of them waited during the last command.
+    /// True if every partner waited during the last command.
     pub partners_wait: bool,
 }
 
 impl PartnerNews {
-    /// Returns the operators that have sent a message, as a reason to end; `None` if there are none.
+    /// Returns the operators that have sent a message, as a reason to end the plan; `None` if there are none.
     pub fn words(&self) -> Option<String> {
         let speakers: Vec<&str> = self.heard.iter().map(String::as_str).collect();
         (!speakers.is_empty()).then(|| format!("{} has spoken", speakers.join(" and ")))
     }
 }
 
-/// Returns true if every partner lets time pass for the others: by `wait`, or because it has finished. A
-/// partner that has been silent for too long counts as thinking.
+/// Returns true if every partner waits for the others, by `wait` or because it has finished. A partner that
+/// has been silent for too long counts as thinking.
 pub fn all_wait(partners: &[Partner]) -> bool {
     let waits = |partner: &Partner| match partner.did {
         PartnerDid::Acted => partner.tool.as_deref() == Some(Wait::NAME),
@@ -41,14 +41,15 @@ pub fn all_wait(partners: &[Partner]) -> bool {
 #[derive(Debug, Clone, Copy)]
 pub struct PlanMoment<'a> {
     pub news: &'a PartnerNews,
-    /// True once wrists have their last targets. A wrist that arrives earlier has only reached an
-    /// intermediate one.
+    /// True once wrists have their last targets. A wrist that reaches its target earlier has only reached an
+    /// intermediate target.
     pub is_way_done: bool,
     /// True once fingers have their last targets.
     pub are_fingers_done: bool,
 }
 
-/// Returns the first condition of `expected` that does not hold after a command, in words; `None` if all hold.
+/// Returns the first condition of `expected` that does not hold after a command, in words; `None` if all
+/// hold.
 pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMoment) -> Option<String> {
     let hands: Vec<(String, &HandReport)> = reply.robots.iter().flat_map(hands_of).collect();
     let find = |is: fn(&HandReport) -> bool| hands.iter().find(|(_, hand)| is(hand));

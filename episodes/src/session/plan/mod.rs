@@ -1,8 +1,8 @@
 //! Plans: several commands in one call. Each command is made, counted and recorded by itself, so a
 //! recording contains no plans.
 //!
-//! A [`PlanRun`] returns the next command and receives its reply. It serves both a plan of the policy of
-//! all robots, and one of an operator whose commands pass through the team's rounds.
+//! A [`PlanRun`] returns the next command and receives its reply. It serves both a plan of the policy of all
+//! robots, and an operator's plan, whose commands pass through the team's rounds.
 
 mod carry;
 mod commands;
@@ -117,12 +117,12 @@ impl PlanRun {
         }
     }
 
-    /// Notes a message from the operator of another robot.
+    /// Registers a message from the operator of another robot.
     pub fn hear(&mut self, from: &str) {
         self.news.heard.insert(from.into());
     }
 
-    /// Notes what the other operators did during the last command.
+    /// Registers the actions of the other operators during the last command.
     pub fn see(&mut self, partners: &[Partner]) {
         self.news.partners_wait = all_wait(partners);
     }
@@ -176,8 +176,8 @@ impl Session {
         reply
     }
 
-    /// Starts a plan of an operator, whose commands are executed together with those of the others. A
-    /// refusal is counted and recorded like that of any call.
+    /// Starts a plan of an operator, whose commands are executed together with the other operators' commands.
+    /// A refusal is counted and recorded like that of any call.
     pub fn begin_plan(&mut self, operator: &OperatorCall, plan: &PlanCall) -> Result<PlanRun, EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::command(operator));
         let caller = CallerRecord::Operator(operator.robot());
@@ -194,8 +194,8 @@ impl Session {
         }
     }
 
-    /// Returns the reply to an operator's finished plan, short if the call asked for that, and shows the whole
-    /// to viewers.
+    /// Returns the reply to an operator's finished plan, and shows the full reply to viewers. The returned
+    /// reply is short if the call requested that.
     pub fn end_plan(
         &mut self,
         call: &Call,

@@ -1,4 +1,4 @@
-//! Outcomes of a plan's commands, in a line each.
+//! Outcomes of a plan's commands, one line each.
 
 use std::collections::BTreeSet;
 
@@ -24,8 +24,8 @@ struct PlanOutcome {
 const MIN_WALKED_M: f64 = 0.02;
 
 impl Outcomes {
-    /// Adds the reply to a command, or to a further piece of the last one. A wrist that `is_under_way` has not
-    /// had its last target.
+    /// Adds the reply to a command, or to a further piece of the last one. A wrist that `is_under_way` has
+    /// not received its last target.
     pub fn add(&mut self, place: &str, reply: &CommandReply, is_under_way: impl Fn(&str, Side) -> bool) {
         if self.0.last().is_none_or(|last| last.place != place) {
             let (place, walked) = (place.into(), BTreeSet::new());
@@ -81,7 +81,7 @@ impl PlanOutcome {
     }
 }
 
-/// Describes a hand: its wrist if that has a target, and its grip if it feels one. `None` without either.
+/// Describes a hand: its wrist if that has a target, and its grip if it senses one. `None` without either.
 fn hand_state(side: &str, hand: &HandReport, is_under_way: bool) -> Option<String> {
     let grip = match hand.grip {
         Some(Grip::TwoSided) => Some("grip two_sided"),

@@ -10,9 +10,9 @@ const BEHIND_COMMANDS: usize = 2;
 /// Progress along a path, and its speed.
 #[derive(Debug, Default)]
 pub struct PathPace {
-    /// Distance that bases have been commanded to go.
+    /// Distance that bases have been commanded to travel.
     pub gone_m: f64,
-    /// Those distances after each of the latest commands, the oldest first.
+    /// That distance after each of the latest commands, the oldest first.
     latest_m: [f64; BEHIND_COMMANDS + 1],
     pub pace_m_s: f64,
     pub waited: u32,
@@ -35,7 +35,7 @@ impl PathPace {
         self.follow();
     }
 
-    /// Stands for a command, while robots catch up with earlier ones.
+    /// Waits for one command, while robots catch up with earlier commands.
     pub fn stand(&mut self) {
         self.pace_m_s = 0.0;
         self.follow();
@@ -46,7 +46,7 @@ impl PathPace {
         self.latest_m[BEHIND_COMMANDS] = self.gone_m;
     }
 
-    /// Returns the distance that robots are expected to have gone.
+    /// Returns the distance that robots are expected to have travelled.
     pub fn expected_m(&self) -> f64 {
         self.latest_m[0]
     }

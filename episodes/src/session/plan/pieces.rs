@@ -44,7 +44,7 @@ impl Pieces {
     ///
     /// # Errors
     ///
-    /// A piece that cannot be executed.
+    /// If a piece cannot be executed.
     pub fn new(call: &ActCall, session: &Session) -> Result<Pieces, EpisodeError> {
         let kind = match call {
             ActCall::Wait(_) => PieceKind::Wait,
@@ -88,8 +88,8 @@ impl Pieces {
         })
     }
 
-    /// Returns true once wrists have their last targets. A wrist that arrives earlier has only reached an
-    /// intermediate one.
+    /// Returns true once wrists have their last targets. A wrist that reaches its target earlier has only
+    /// reached an intermediate target.
     pub fn is_way_done(&self) -> bool {
         self.done >= self.steps || !matches!(self.kind, PieceKind::Wrists(_))
     }
@@ -101,7 +101,7 @@ impl Pieces {
             || ways.iter().all(|way| way.fingers_rad.left.is_none() && way.fingers_rad.right.is_none())
     }
 
-    /// Returns true if this wrist has a target that it has not been given yet.
+    /// Returns true if this wrist has a target that it has not received yet.
     pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
         let PieceKind::Wrists(ways) = &self.kind else { return false };
         self.done < self.steps

@@ -19,8 +19,8 @@ const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
 const ASIDE_M_S: f64 = 0.2;
 const TURN_RAD_S: f64 = 0.4;
-/// Distance and angle to its place at which a robot is stopped, since it coasts a little; and the larger
-/// distance at which a waypoint counts as passed.
+/// Distance and angle to its place at which a robot is stopped, since it coasts a little. The larger distance
+/// is that at which a waypoint counts as passed.
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;
@@ -29,8 +29,8 @@ const PASSED_M: f64 = 0.1;
 const SLOW_WALKS: u32 = 4;
 const CLOSE_M: f64 = 0.15;
 const CLOSE_RAD: f64 = 0.3;
-/// Tolerances of a standing robot: within the first it has arrived, but corrections continue until the
-/// second.
+/// Tolerances of a standing robot. Within the first distance and angle it has reached its place, but
+/// corrections continue until it is within the second.
 pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
 pub const WELL_M: f64 = 0.013;
@@ -52,7 +52,7 @@ enum WalkerStage {
     Walks,
     /// A short walk from its standing place to its goal.
     Corrects,
-    /// Remainder of such a walk. Commands of other operators may have shortened its own.
+    /// Remainder of such a walk. Commands of other operators may have shortened its command.
     Pulses {
         vx_m_s: f64,
         vy_m_s: f64,
@@ -78,7 +78,7 @@ struct Walker {
     corrections: Corrections,
 }
 
-/// Robots that walk, each to a place of its own.
+/// Robots that walk to separate places.
 #[derive(Debug)]
 pub struct WalkPlan {
     walkers: Vec<Walker>,
@@ -116,7 +116,8 @@ impl WalkPlan {
         })
     }
 
-    /// Returns how far from their places robots that have not come to rest will stand; empty if all rest.
+    /// Returns the distances from their places at which robots that have not come to rest will stand; empty
+    /// if all rest.
     fn rests(&self, last: Option<&CommandReply>) -> String {
         let reports = last.map_or(&[][..], |reply| &reply.robots);
         let rest = |walker: &Walker| {
@@ -164,7 +165,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// A robot that the episode does not have.
+    /// If the episode lacks one of the robots.
     pub(super) fn walk_plan(&self, walk: &WalkTo) -> Result<WalkPlan, EpisodeError> {
         let walkers =
             walk.robots.iter().map(|entry| self.walker(entry, walk.frame)).collect::<Result<_, _>>()?;

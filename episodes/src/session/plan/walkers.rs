@@ -1,4 +1,4 @@
-//! Walks to places: of robots that are free, and of those that carry or push a load.
+//! Walks to places, of robots without a load and of robots that carry or push one.
 
 use tandem_tools_spec::{CommandReply, PoseFrame, SpecError, Tool as _, WalkTo};
 

@@ -10,9 +10,9 @@ use crate::convert::isometry_from_sim;
 /// moments half a cycle apart is free of the sway.
 pub const WALK_STEPS: u32 = 13;
 pub const WALK_S: f64 = WALK_STEPS as f64 / CONTROL_HZ;
-/// Length in metres that counts like a radian.
+/// Length in metres that counts as much as a turn of one radian.
 const M_PER_RAD: f64 = 0.5;
-/// Fraction of earlier misses that a correction adds, and its limit.
+/// Fraction of earlier forward errors that a correction adds, and the limit of their sum.
 const MISSED_PART: f64 = 0.5;
 const MAX_MISS_M: f64 = 0.04;
 
@@ -41,12 +41,12 @@ pub struct Missing {
     pub turn_rad: f64,
 }
 
-/// Short walks that correct a robot's place. Each also adds to the misses of earlier ones ahead or back.
-/// A stepping robot leans differently from a standing one, and would otherwise stop behind its place
-/// every time.
+/// Short walks that correct a robot's place. Each also compensates the accumulated forward error of earlier
+/// corrections. A stepping robot leans differently from a standing one, and would otherwise stop behind its
+/// place every time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Corrections {
-    /// Accumulated miss; `None` before the first correction.
+    /// Accumulated forward error; `None` before the first correction.
     missed_ahead_m: Option<f64>,
 }
 
@@ -167,7 +167,7 @@ mod tests {
     /// constant along their paths.
     #[test]
     fn robots_whose_places_fit_go_as_one_body() {
-        // The start frame of B in that of A, and the place of B relative to A.
+        // The pose of B's start frame in A's, and the place of B relative to A.
         let a_from_b = stand(1.3, 0.1, 2.9).start_from_stand();
         let stand_from_partner = stand(1.2, 0.05, PI).start_from_stand();
         let b_of = |a: &Stand| {

@@ -32,7 +32,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// The step at which the repetition differs.
+    /// Returns an error that names the step at which the repetition differs.
     pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
         let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
         let hands = SetHands::default();

@@ -38,7 +38,8 @@ impl Replay {
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
         } else if spec.start != Start::Task {
-            // The file it names is not trusted, and its episode may start from yet another file.
+            // The file that the recording names is not trusted, and its episode may start from yet another
+            // file.
             return Err(CheckpointError::NoBeginning { path: path.into() }.into());
         }
         session.requests = None;
@@ -50,7 +51,8 @@ impl Replay {
         Ok(Replay { session, hands })
     }
 
-    /// Repeats a call at the policy's thinking time `thought`; `shown` is that of [`crate::RecordedCall`].
+    /// Repeats a call at the policy's thinking time `thought`; `shown` has the same meaning as in
+    /// [`crate::RecordedCall`].
     pub fn call(
         &mut self,
         called: &Called,
@@ -71,7 +73,7 @@ impl Replay {
     ///
     /// # Errors
     ///
-    /// An unreadable recording, or a replay that differs from it.
+    /// If the recording cannot be read, or the replay differs from it.
     pub fn checkpoint_at(start: &MomentStart) -> Result<Checkpoint, EpisodeError> {
         let MomentStart { recording: path, control_step, .. } = start;
         let recording = Recording::read(path).map_err(unreadable)?;

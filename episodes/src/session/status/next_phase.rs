@@ -113,7 +113,7 @@ fn others<'a>(
 }
 
 /// Returns the sentence about a part that differs between the variants which a reader cannot tell apart. It
-/// names all of their options, and not whether the part holds.
+/// names all of their options, but does not say whether the part holds.
 fn kept_back(parts: &[Option<&ConditionPart>]) -> String {
     let mut texts: Vec<&str> = Vec::new();
     for text in parts.iter().flatten().map(|part| part.text.as_str()) {

@@ -1,5 +1,5 @@
 //! Information for a policy. Information that its assistance withholds is removed from every reply here and
-//! nowhere else. Information beyond the benchmark's own policies is counted by kind and by robot.
+//! nowhere else. Information that the benchmark withholds from its policies is counted by kind and by robot.
 
 mod short;
 
@@ -20,7 +20,7 @@ use crate::EpisodeError;
 use crate::commands::{Allowed, Called};
 use crate::observation::TeamObservation;
 
-/// Number of replies with information beyond the benchmark's own policies.
+/// Number of replies with information that the benchmark withholds from its policies.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ShownInformation(BTreeMap<ExtraInformation, BTreeMap<String, u32>>);
 

@@ -105,8 +105,8 @@ fn shorten_command(reply: &mut CommandReply) {
     shorten_report(reply, reply.executed_steps, false);
 }
 
-/// Shortens the reply to the last command of a call that took `executed_steps`. With `tells_pelvises`, it keeps
-/// the pelvises of robots that have not moved during that command.
+/// Shortens the reply to the last command of a call that took `executed_steps`. With `tells_pelvises`, it
+/// keeps the pelvises of robots that have not moved during that command.
 fn shorten_report(reply: &mut CommandReply, executed_steps: u32, tells_pelvises: bool) {
     reply.fallen.retain(|robot| robot.fallen);
     // Half a step before the first one, against rounding.
@@ -132,7 +132,7 @@ fn shorten_robot(report: &mut RobotReport, tells_pelvises: bool) {
     shorten_hand(right);
 }
 
-/// Returns the report on the same robot with hands that have no target and feel no contact.
+/// Returns the report on the same robot with hands that have no target and sense no contact.
 fn still(report: &RobotReport) -> RobotReport {
     let RobotReport { robot, frame, .. } = report;
     let hand = HandReport { state: Some(HandState::Idle), ..HandReport::default() };

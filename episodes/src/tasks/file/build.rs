@@ -64,7 +64,7 @@ pub(super) fn file(source: &TaskSource, xxh3: &str) -> Result<TaskFile, TaskFile
     })
 }
 
-/// Returns the definition whose texts name all options, from that of any variant.
+/// Returns the definition whose texts name all options, made from the definition of any variant.
 fn undecided(variant: &TaskDefinition, table: &TaskTable, choices: &[Choice]) -> TaskDefinition {
     let with_all = |text: &Spanned<String>| with_options(text.as_ref(), choices);
     let robots = variant.robots.iter().zip(table.robots.as_ref());

@@ -38,7 +38,7 @@ static IN_USE: Mutex<Vec<Weak<TaskFile>>> = Mutex::new(Vec::new());
 ///
 /// # Errors
 ///
-/// An unreadable file, or the mistakes in the task file.
+/// If a file cannot be read, or the task file has mistakes.
 pub fn read_task(path: &Path) -> Result<Task, TaskFileError> {
     let read = |path: &Path| {
         read_text(path, MAX_TEXT_BYTES).map_err(|source| TaskFileError::Read { path: path.into(), source })
@@ -61,7 +61,7 @@ pub fn read_task(path: &Path) -> Result<Task, TaskFileError> {
 ///
 /// # Errors
 ///
-/// The mistakes in the task file.
+/// If the task file has mistakes.
 pub fn task_of(source: TaskSource) -> Result<Task, TaskFileError> {
     if let Some(file) = in_use(|file| file.undecided.source == source) {
         return Ok(Task::undecided(file));

@@ -25,7 +25,7 @@ pub struct TaskTable {
     /// True for a task that needs closing hands even if no condition requires them.
     #[serde(default)]
     pub needs_fingers: bool,
-    /// Grips that the brief explains; every one of them if it is not given.
+    /// Grips that the brief explains; all grips if it is not given.
     pub grips: Option<Vec<GripKind>>,
     #[serde(default)]
     pub budget: BudgetTable,

@@ -232,7 +232,7 @@ fn the_suite_is_whole() {
         assert_eq!((task.suite(), set.find(&task.id).ok()), (Some(TANDEM_PLUS), Some(task)));
         assert!(crate::tasks::find(&task.id).is_err(), "{} is none of the ten", task.id);
         assert_eq!(EpisodeSpec::new(task, 0, Protocol::Benchmark).peculiarities()[0], "suite: tandem+");
-        // Information for a single robot does not appear in an instruction that all of them read.
+        // Information for a single robot does not appear in an instruction that all robots receive.
         let shared = task.shared_instruction.as_ref().unwrap_or(&task.instruction);
         assert!(
             !shared.contains('[')
@@ -360,7 +360,7 @@ fn files_beside_it_belong_to_it() {
     assert!(error.contains("room.xml:1") && error.contains("names no other file"), "{error}");
 }
 
-/// Writes a house with a chest of drawers and a mug; its chest is a mesh in a file of its own.
+/// Writes a house with a chest of drawers and a mug; the chest is a mesh in a separate file.
 fn house() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();

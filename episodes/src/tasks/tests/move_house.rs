@@ -20,7 +20,7 @@ fn held() -> Facts {
     Facts::at_rest(&task()).held_by(&[B, C], "console_table")
 }
 
-/// Places the table's middle on that of the marks, offset by `beside_m` and rotated by `degrees`.
+/// Places the table's middle on the middle of the marks, offset by `beside_m` and rotated by `degrees`.
 fn at_marks(mut facts: Facts, beside_m: Vector, degrees: f32) -> Facts {
     let marks_m = facts.position_m("foot_marks");
     facts.object_mut("console_table").pose_in_world =
@@ -139,6 +139,6 @@ fn place_on_both_sides_of_every_threshold() {
         assert!(placed(&inside), "{what} inside");
         assert!(!placed(&outside), "{what} outside");
     }
-    // A tilt of 15 degrees would lift feet off their marks; the limit is the common one of all placements.
+    // A tilt of 15 degrees would lift feet off their marks; the limit is the one that all placements share.
     assert!(!placed(&stands(Vector::ZERO, 0.0).turned("console_table", Vector::X, 0.3)));
 }

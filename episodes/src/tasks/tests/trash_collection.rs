@@ -31,7 +31,7 @@ fn lift_on_both_sides_of_2_cm_and_by_a() {
     assert!(!lifted(&Facts::at_rest(&task()).held_by(&[B], "bin").raised("bin", 0.0201)));
     let touched = held().grip(A, Left, "bin", Touching).grip(A, Right, "bin", Touching);
     assert!(!lifted(&touched.raised("bin", 0.0201)));
-    // The lowest point counts: at a tilt of 5 degrees, one of a long side, 85 mm from the middle.
+    // The lowest point counts: at a tilt of 5 degrees, it is on a long side, 85 mm from the middle.
     let leaning = |lift_m: f32| held().raised("bin", lift_m).turned("bin", Vector::X, 5_f32.to_radians());
     assert!(lifted(&leaning(0.0276)));
     assert!(!lifted(&leaning(0.0272)));
@@ -52,8 +52,8 @@ fn deliver_on_both_sides_of_every_threshold() {
     ] {
         assert_eq!(delivered(&held_at(beside_m, base_m)), expected, "{beside_m} {base_m}");
     }
-    // The highest point of the rim counts. At a tilt of 5 degrees it is one of a long side: 0.715 m up,
-    // 82 mm from the middle, on a rim 6 mm thick.
+    // The highest point of the rim counts. At a tilt of 5 degrees, it is on a long side: 0.715 m up, 82 mm
+    // from the middle, on a rim 6 mm thick.
     for degrees in [5_f32, -5.0] {
         let leaning =
             |base_m: f32| held_at(Vector::ZERO, base_m).turned("bin", Vector::X, degrees.to_radians());

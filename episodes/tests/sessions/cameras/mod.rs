@@ -140,7 +140,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
     let is_right = |(depth_m, truly): &(f64, DepthRow)| {
         let Some(point_m) = truly.point_m() else { return false };
         let true_m = (pelvis_from_camera.inverse() * Point3::from(point_m)).z;
-        // Five standard deviations, and a pixel of a slanted surface.
+        // The tolerance is five standard deviations, and a pixel of a slanted surface.
         (depth_m - true_m).abs() < 5.0 * 0.0025 * true_m * true_m + 0.02 * true_m
     };
     let of = depths_m.len();

@@ -304,7 +304,7 @@ fn targets_are_read_in_the_frame_that_they_name() {
     assert!(ahead.z.abs() < 0.03, "level fingers: {ahead}, {report:?}");
 }
 
-/// B faces A across the counter. Both know a place in the room by the same numbers.
+/// B faces A across the counter. A place in the room has the same coordinates for both.
 #[test]
 fn the_room_frame_is_the_same_for_all_robots() {
     let mut session = handover(2011);

@@ -1,5 +1,5 @@
-//! Tests of recordings with changed or missing bytes: reading never aborts or panics, none is verified,
-//! and recovered ones can be replayed.
+//! Tests of recordings with changed or missing bytes. Reading never aborts or panics, no changed recording is
+//! verified, and recovered recordings can be replayed.
 
 use std::fs;
 use std::ops::Range;

@@ -76,7 +76,7 @@ fn nothing_is_read_of_what_a_recording_names() {
     let endless = take_over(Path::new("/dev/zero")).unwrap_err();
     assert!(endless.contains("no regular file"), "{endless}");
 
-    // One starts from a device, and one from itself.
+    // One recording starts from a device, the other from itself.
     for names in [Path::new("/dev/zero"), &own] {
         forge(folder.path(), |entries| begin_at(entries, names));
         let text = verify(&Recording::read(&own).unwrap()).map(drop).unwrap_err().to_string();

@@ -120,7 +120,7 @@ fn distractors_stand_in_every_task_and_rest() {
     }
 }
 
-/// The noise is that of a G1, then twice and four times as much, number by number.
+/// The noise is that of a G1, then twice and four times as strong, in every value.
 #[test]
 fn sensors_are_ever_noisier() {
     let read = |stress| {

@@ -1,5 +1,5 @@
-//! Tests of surfaces of objects by name, and of images of depth: both are for full assistance, and results name
-//! them.
+//! Tests of surfaces of objects by name, and of images of depth: both are for full assistance, and results
+//! name them.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
@@ -33,7 +33,7 @@ fn counted(session: &Session, what: &str) -> Value {
     json!(session.result().extra_information_replies)[what].clone()
 }
 
-/// Both robots look at the bottle from two sides, and know its axis by the same numbers.
+/// Both robots look at the bottle from two sides, and receive the same coordinates of its axis.
 #[test]
 fn an_object_is_found_by_its_name() {
     let own = spec("handover", 2011, Protocol::Agentic).assisted(Assistance::Full);

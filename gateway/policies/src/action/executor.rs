@@ -1,5 +1,5 @@
-//! Executes the actions of policies with the public commands: `send_joint_chunk`, `move_wrists` for poses,
-//! or `send_joint_drives` for setpoints of motors.
+//! Executes the actions of policies with the public commands: `send_joint_chunk`, `move_wrists` for wrist
+//! poses, or `send_joint_drives` for motor setpoints.
 
 use std::{iter, ops::Range};
 
@@ -29,16 +29,16 @@ pub struct Executor<'a> {
     most_steps: usize,
     /// Last commanded row of each robot, in the task's order.
     last_rows: Vec<Vec<f64>>,
-    /// Pose of each robot's pelvis in the start frame, by its own odometry.
+    /// Pose of each robot's pelvis in its start frame, from the robot's odometry.
     start_from_pelvis: Vec<Isometry3<f64>>,
 }
 
-/// A command that is not made yet. Its wrist targets depend on the pelvis poses at its beginning.
+/// A command before its conversion to a call. Its wrist targets depend on the pelvis poses at its beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlannedCommand {
     Joints(SendJointChunk),
     Drives(SendJointDrives),
-    /// Every robot moves to its row with this index.
+    /// Every robot moves to the wrist targets of its row with this index.
     Wrists {
         row: usize,
         steps: u32,
@@ -51,7 +51,7 @@ pub fn executed_rows(chunks: &[RobotRows]) -> usize {
 }
 
 impl<'a> Executor<'a> {
-    /// Creates an executor for robots in the `observed` state that have no command yet.
+    /// Creates an executor for robots in the `observed` state that have had no command yet.
     pub fn new(map: &'a PolicyMap, most_steps: usize, observed: &PolicyObservation) -> Executor<'a> {
         let last_rows = observed.robots.iter().map(|robot| held_row(&robot.state_values)).collect();
         let mut executor =
@@ -60,13 +60,13 @@ impl<'a> Executor<'a> {
         executor
     }
 
-    /// Updates the pelvis poses.
+    /// Updates the pelvis poses from an observation.
     pub fn sense(&mut self, observed: &PolicyObservation) {
         let pelvises = observed.robots.iter().map(|robot| pose_of(sensed_pelvis(&robot.state_values)));
         self.start_from_pelvis = pelvises.collect();
     }
 
-    /// Executes the rows with the indices `rows` of `chunks`, which are in the task's order.
+    /// Executes the rows with the indices `rows` from `chunks`, which are in the task's order of robots.
     pub fn execute(
         &mut self,
         episode: &mut dyn LocalEpisode,
@@ -87,7 +87,8 @@ impl<'a> Executor<'a> {
         Ok(())
     }
 
-    /// Returns the commands for the rows with the indices `rows`, none longer than the protocol allows.
+    /// Returns the commands for the rows with the indices `rows`. No command is longer than the protocol
+    /// allows.
     pub fn commands(&self, chunks: &[RobotRows], rows: Range<usize>) -> Vec<PlannedCommand> {
         let mut spans = spans(executed_rows(chunks), self.map.rate_hz());
         spans.retain(|span| rows.contains(&span.row));
@@ -133,7 +134,7 @@ impl<'a> Executor<'a> {
         (0..steps).step_by(self.most_steps).map(command).collect()
     }
 
-    /// Returns commands for motors. Each row is held until the next.
+    /// Returns the commands for motors. Each row is held until the next one.
     fn drive_commands(&self, chunks: &[RobotRows], spans: &[RowSpan]) -> Vec<PlannedCommand> {
         let rows: Vec<usize> =
             spans.iter().flat_map(|span| iter::repeat_n(span.row, span.steps as usize)).collect();
@@ -147,7 +148,7 @@ impl<'a> Executor<'a> {
         rows.chunks(self.most_steps).map(command).collect()
     }
 
-    /// Converts a command of [`Executor::commands`] to a call for the current state.
+    /// Converts a command from [`Executor::commands`] to a call for the current state.
     pub fn call(&self, planned: PlannedCommand, chunks: &[RobotRows]) -> ToolCall {
         match planned {
             PlannedCommand::Joints(command) => command.into(),

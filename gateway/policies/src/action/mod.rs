@@ -1,4 +1,4 @@
-//! Conversion of a policy's reply to commands; the reply is checked against the map before a robot moves.
+//! Conversion of a policy's reply to commands. The reply is checked against the map before any robot moves.
 
 mod executor;
 mod spans;
@@ -32,17 +32,17 @@ pub struct RobotRows {
 pub struct ActionRow {
     /// Row of `send_joint_chunk`. Arms and waist are ignored if the robot follows wrist poses.
     pub row: Vec<f64>,
-    /// Left and right wrist.
+    /// Targets of the left and the right wrist.
     pub wrists: [WristTarget; 2],
-    /// Row of `send_joint_drives`, if the policy drives motors; empty otherwise.
+    /// Row of `send_joint_drives` if the policy drives motors; empty otherwise.
     pub motor_row: Vec<f64>,
 }
 
-/// Some columns of every row of one robot in a reply.
+/// Values of some action columns of one robot, for all rows of a reply.
 struct ColumnBlock<'a> {
     key: String,
     columns: Vec<usize>,
-    /// Values by row. In each row, this robot's values begin at `from`.
+    /// Values of all rows, row by row. In each row, this robot's values begin at the index `from`.
     values: &'a [f64],
     from: usize,
     width: usize,
@@ -72,8 +72,8 @@ pub fn chunks(
     Ok(found)
 }
 
-/// Finds the columns for the robot called `name`, which is number `place` of the `robots` that the answer
-/// moves.
+/// Returns the columns for the robot called `name`, which has the index `place` among the `robots` that the
+/// answer moves.
 fn parts<'a>(
     map: &PolicyMap,
     answer: &'a ReplyValue,
@@ -97,7 +97,7 @@ fn parts<'a>(
     Ok(parts)
 }
 
-/// Joins the parts to rows of all columns that a policy may command, for the rows that are executed.
+/// Joins the blocks to rows with all columns that a policy may command, for the rows that are executed.
 fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Vec<Vec<f64>>, RemoteError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let rows = first.values.len() / first.width;
@@ -128,7 +128,7 @@ fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Ve
     Ok((0..executed).map(row).collect())
 }
 
-/// Converts the values `told_values` of row number `row` to an action for a robot in the state
+/// Converts `told_values`, the values of row number `row`, to an action for a robot in the state
 /// `state_values`.
 fn action_row(
     map: &PolicyMap,
@@ -170,7 +170,7 @@ fn action_row(
     }
 }
 
-/// Returns the setpoints of motors in row number `row`.
+/// Returns the motor setpoints in row number `row`.
 fn read_motors(told_values: &[f64], row: usize) -> Result<Vec<f64>, RemoteError> {
     let setpoints = told_values[motors()].to_vec();
     let gains = setpoints.len() * 2 / 5..setpoints.len() * 4 / 5;
@@ -187,7 +187,7 @@ fn read_motors(told_values: &[f64], row: usize) -> Result<Vec<f64>, RemoteError>
     }
 }
 
-/// Limit on the magnitude of motors' setpoints: more than any gain of a G1's motor.
+/// Limit on the magnitude of motor setpoints, above any gain of a G1's motors.
 const LARGEST_SETPOINT: f64 = 10_000.0;
 
 /// Limit on the magnitude of values. Larger ones mean that the policy uses other units or has diverged.
@@ -331,7 +331,7 @@ mod tests {
         observed.robots[1].state_values[15] = 0.5;
         *observed.robots[1].state_values.last_mut().unwrap() = 0.7;
         let rows = &read_at(&own, &keyed(&[("a", array(&[2, 11]))]), &[1], &observed).unwrap()[0].rows;
-        // The first joint of the arm, the waist as commanded, the height, and a held joint.
+        // First arm joint, waist as commanded, height, and a held joint.
         let row = &rows[1].row;
         assert_eq!((row[0], row[28], row[7]), (0.5 + 0.11, 0.18, 8.0));
         assert!((row[34] - (0.7 + 0.21)).abs() < 1e-12, "{row:?}");

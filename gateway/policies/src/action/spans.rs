@@ -1,21 +1,21 @@
-//! Rows at a policy's rate, and the control steps that they last.
+//! Rows at a policy's rate, with the control steps that they span.
 
 use tandem_episodes::{CONTROL_HZ, rows::between_rows};
 
 use super::ActionRow;
 use crate::map::Between;
 
-/// A row with the number of control steps in which robots move to its targets.
+/// A row, with the number of control steps in which robots move to its targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowSpan {
     pub row: usize,
     pub steps: u32,
 }
 
-/// Returns the spans of `rows` rows at `rate_hz`. Row i is reached at (i + 1) / rate.
+/// Returns the spans of `rows` rows at `rate_hz`. Row i is reached at the time (i + 1) / `rate_hz`.
 ///
-/// If several rows fall within one control step, the last counts. Rows that are too short for a control
-/// step make one.
+/// If several rows fall within one control step, the last one is used. If all rows together are too short for
+/// a control step, they take one.
 pub fn spans(rows: usize, rate_hz: f64) -> Vec<RowSpan> {
     let reached_at = |row: usize| ((row + 1) as f64 * CONTROL_HZ / rate_hz).round() as u32;
     let (mut spans, mut begins) = (Vec::with_capacity(rows), 0);
@@ -33,8 +33,8 @@ pub fn spans(rows: usize, rate_hz: f64) -> Vec<RowSpan> {
     spans
 }
 
-/// Converts rows to those of `send_joint_chunk`, one per control step, for a robot whose last command was
-/// `from_row`.
+/// Converts rows to rows of `send_joint_chunk`, one per control step, for a robot whose last commanded row
+/// was `from_row`.
 pub fn control_rows(
     rows: &[ActionRow],
     spans: &[RowSpan],
@@ -70,7 +70,7 @@ mod tests {
         assert_eq!(spanned(3, 50.0), [(0, 1), (1, 1), (2, 1)]);
         assert_eq!(spanned(4, 15.0), [(0, 3), (1, 4), (2, 3), (3, 3)]);
         assert_eq!(spanned(2, 2.0), [(0, 25), (1, 25)]);
-        // If two rows fall in one control step, the later one counts.
+        // If two rows fall within one control step, the later one is used.
         assert_eq!(spanned(4, 100.0), [(1, 1), (3, 1)]);
         assert_eq!(spanned(2, 1000.0), [(1, 1)], "at least one step, so that time goes on");
         let total: u32 = spans(150, 15.0).iter().map(|span| span.steps).sum();
@@ -91,7 +91,7 @@ mod tests {
         };
         assert_eq!(played(Between::Interpolate, 0), [0.5, 1.0, 1.5, 2.0]);
         assert_eq!(played(Between::Hold, 0), [1.0, 1.0, 2.0, 2.0]);
-        // Velocities are not positions; the height is one.
+        // Velocities are not interpolated, in contrast to positions such as the height.
         assert_eq!(played(Between::Interpolate, 31), [1.0, 1.0, 2.0, 2.0]);
         assert_eq!(played(Between::Interpolate, 34), [0.5, 1.0, 1.5, 2.0]);
     }

@@ -23,7 +23,7 @@ pub fn find<'a>(
     })?;
     let ReplyValue::Array { shape, values } = value else { return Err(misfit(value.describe())) };
     let (have_rows, have_width) = match shape[..] {
-        // One column, or one row.
+        // A table with one column, or with one row.
         [length] if width == 1 => (length, 1),
         [length] => (1, length),
         [.., rows, width] => (rows, width),

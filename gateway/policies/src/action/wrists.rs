@@ -11,7 +11,7 @@ use crate::{
     poses::RotationForm,
 };
 
-/// Target of a wrist: position, rotation, both or none.
+/// Target of a wrist: position, rotation, both or neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WristTarget {
     pub position_m: Option<Vector3<f64>>,
@@ -19,7 +19,7 @@ pub struct WristTarget {
 }
 
 impl WristTarget {
-    /// Reads the target of a wrist from `told_values`, where the policy commands `told_columns`.
+    /// Reads the target of a wrist from `told_values`, if the policy commands it according to `told_columns`.
     pub fn read(told_values: &[f64], told_columns: &[usize], side: usize) -> Result<WristTarget, String> {
         let position = wrist_position(side);
         let position_m = told_columns
@@ -37,8 +37,8 @@ impl WristTarget {
         Ok(WristTarget { position_m, rotation: rotation.transpose()? })
     }
 
-    /// Converts the target to its execution frame: the start frame if hands stay fixed in the world, else
-    /// the pelvis frame.
+    /// Converts the target to its execution frame. This is the start frame if hands stay fixed in the world,
+    /// otherwise the pelvis frame.
     pub fn resolved(
         self,
         frame: WristFrame,
@@ -55,7 +55,7 @@ impl WristTarget {
         }
     }
 
-    /// Applies this difference to `pose`, along and about the axes of the frame of the pose.
+    /// Adds this difference to `pose`, along and about the axes of the frame in which `pose` is expressed.
     fn beside(self, pose: &Isometry3<f64>) -> WristTarget {
         WristTarget {
             position_m: self.position_m.map(|step_m| pose.translation.vector + step_m),
@@ -63,8 +63,7 @@ impl WristTarget {
         }
     }
 
-    /// Transforms the target from the frame whose pose is `pose` to the frame in which that pose is
-    /// given.
+    /// Transforms the target from the frame whose pose is `pose` to the frame in which `pose` is expressed.
     fn moved(self, pose: &Isometry3<f64>) -> WristTarget {
         WristTarget {
             position_m: self.position_m.map(|position_m| (pose * Point3::from(position_m)).coords),
@@ -136,7 +135,7 @@ mod tests {
         (pelvis_from_wrist, start_from_pelvis)
     }
 
-    /// Returns the wrist target of the command for a step of 10 cm along x.
+    /// Returns the wrist target of the command for a displacement of 10 cm along x.
     fn goes(frame: WristFrame, is_delta: bool) -> ([f64; 3], [f64; 4], bool) {
         let (pelvis_from_wrist, start_from_pelvis) = poses();
         let told =

@@ -13,7 +13,7 @@ use crate::{
     values::{ReplyValue, RequestValue},
 };
 
-/// URL schemes of such servers; the encrypted one is last.
+/// URL schemes of `/act` servers; the encrypted one is last.
 pub const SCHEMES: [&str; 2] = ["http://", "https://"];
 
 /// Authorization scheme of the key.
@@ -69,7 +69,7 @@ impl Act {
     }
 }
 
-/// Returns true if the server was not reached at all.
+/// Returns true if the server could not be reached.
 fn is_unreachable(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -107,7 +107,7 @@ impl PolicyClient for Act {
         reply.map_err(|reason| RemoteError::Unreadable { url: self.url.clone(), reason })
     }
 
-    /// Does nothing: requests are independent.
+    /// Does nothing, because requests are independent.
     fn begin_trial(&mut self, _within: Duration) -> Result<(), RemoteError> {
         Ok(())
     }
@@ -115,7 +115,7 @@ impl PolicyClient for Act {
     fn keep_alive(&mut self) {}
 }
 
-/// Converts to JSON, with arrays in the format of `json_numpy`: `{"__numpy__": base64, "dtype": "<f4",
+/// Converts a request to JSON. Arrays have the format of `json_numpy`: `{"__numpy__": base64, "dtype": "<f4",
 /// "shape": [2, 3]}`.
 fn to_json(request: &RequestValue) -> Value {
     match request {
@@ -132,7 +132,7 @@ fn to_json(request: &RequestValue) -> Value {
     }
 }
 
-/// Reads JSON. Lists of numbers become arrays, too.
+/// Parses JSON. Lists of numbers also become arrays.
 fn from_json(value: Value) -> Result<ReplyValue, String> {
     match value {
         Value::Object(object) if object.contains_key("__numpy__") => {

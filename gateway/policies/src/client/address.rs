@@ -14,7 +14,7 @@ const KEY_VARIABLE: &str = "TANDEM_POLICY_KEY";
 /// Maximum size of a key file in bytes.
 const MAX_KEY_BYTES: u64 = 8 << 10;
 
-/// A server of a policy.
+/// Address of a policy's server, with the key that it requires.
 #[derive(Clone, Debug)]
 pub struct PolicyAddress {
     /// URL with its scheme.
@@ -35,7 +35,7 @@ pub enum PolicyKeyError {
     Unreadable {
         /// Path of the file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The text is not a valid key.
@@ -90,7 +90,7 @@ impl PolicyKey {
             true => text.to_owned(),
             false => format!("{scheme} {text}"),
         };
-        // The key is a valid header value, so this is one, too.
+        // The key is a valid header value, so the combined text is valid, too.
         let mut value = HeaderValue::from_str(&whole).unwrap_or_else(|_| self.0.clone());
         value.set_sensitive(true);
         value
@@ -104,13 +104,13 @@ impl fmt::Debug for PolicyKey {
 }
 
 impl PolicyAddress {
-    /// Returns the host and port after the scheme.
+    /// Returns the host and port, without the scheme.
     pub fn authority(&self) -> &str {
         let rest = self.url.split_once("://").map_or(self.url.as_str(), |(_, rest)| rest);
         rest.split(['/', '?', '#']).next().unwrap_or_default()
     }
 
-    /// Returns the host alone, without the brackets of IPv6.
+    /// Returns the host without port and without the brackets of IPv6 addresses.
     pub fn host(&self) -> &str {
         let authority = self.authority();
         match authority.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
@@ -119,7 +119,7 @@ impl PolicyAddress {
         }
     }
 
-    /// Returns the port if the address has one.
+    /// Returns the port, if the address contains a port.
     pub fn port(&self) -> Option<u16> {
         let authority = self.authority();
         let behind = authority.rsplit_once(']').map_or(authority, |(_, behind)| behind);

@@ -8,7 +8,7 @@ use tokio_rustls::rustls::{
 };
 use ureq::tls::{Certificate, RootCerts, TlsConfig};
 
-/// Error message for a machine without trusted certificates.
+/// Error message for a machine without trusted root certificates.
 const TRUSTS_NOBODY: &str = "this machine has no certificates of authorities that it trusts; install ca-certificates, or name a file \
      with the server's own in SSL_CERT_FILE";
 

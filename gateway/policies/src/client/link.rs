@@ -1,4 +1,4 @@
-//! A WebSocket to a policy's server, with a time limit on every operation.
+//! A WebSocket connection to a policy's server, with a time limit on every operation.
 
 use std::{
     io::{self, Read, Write},
@@ -15,13 +15,13 @@ use tungstenite::{
 use super::{PolicyAddress, encryption::encrypted};
 use crate::error::{RemoteError, gist};
 
-/// URL schemes of such servers; the encrypted one is last.
+/// URL schemes of WebSocket servers; the encrypted one is last.
 pub const SCHEMES: [&str; 2] = ["ws://", "wss://"];
 
 /// Authorization scheme of the key, the same as in openpi's client.
 const KEY_SCHEME: &str = "Api-Key";
 
-/// Default port.
+/// Default port of unencrypted connections.
 const PORT: u16 = 80;
 const ENCRYPTED_PORT: u16 = 443;
 
@@ -31,15 +31,15 @@ pub struct PolicySocket {
     socket: WebSocket<PolicyStream>,
 }
 
-/// A message of the server.
+/// A message from the server.
 pub enum Frame {
     Bytes(Vec<u8>),
     Text(String),
 }
 
 impl PolicySocket {
-    /// Connects to a server. It must be reachable within `connect_within`, but may be busy with another
-    /// client until `within`.
+    /// Connects to a server. It must accept the connection within `connect_within`. It has `within` for the
+    /// handshake, because it may be busy with another client.
     pub fn connect(
         address: &PolicyAddress,
         connect_within: Duration,
@@ -53,7 +53,7 @@ impl PolicySocket {
         stream.plain().deadline = Instant::now() + within;
         let page = stream.page();
         let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
-            // This is a proxy's error page, or a server of another kind.
+            // The server is a proxy with an error page, or does not use WebSocket.
             HandshakeError::Failure(Error::Http(response)) => {
                 let status = response.status();
                 let begun = response.into_body().unwrap_or_default();
@@ -70,14 +70,14 @@ impl PolicySocket {
         &self.url
     }
 
-    /// Sends a binary message. The server then has `within` to answer.
+    /// Sends a binary message. The server must then answer within `within`.
     pub fn send(&mut self, bytes: Vec<u8>, within: Duration) -> Result<(), RemoteError> {
         self.socket.get_mut().plain().deadline = Instant::now() + within;
         self.socket.send(Message::binary(bytes)).map_err(|error| self.failed(error, within))
     }
 
-    /// Receives the next message before the deadline of the last request; `within` is the length of its
-    /// time limit.
+    /// Receives the next message before the deadline of the last request. Errors report `within` as the time
+    /// limit.
     pub fn hear(&mut self, within: Duration) -> Result<Frame, RemoteError> {
         loop {
             match self.socket.read().map_err(|error| self.failed(error, within))? {
@@ -89,13 +89,13 @@ impl PolicySocket {
                     });
                     return Err(RemoteError::Gone { url: self.url.clone(), reason });
                 }
-                // The library answers these.
+                // The WebSocket library answers pings.
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
             }
         }
     }
 
-    /// Answers pings of the server. Other failures show with the next request.
+    /// Answers pings from the server. Other failures are reported by the next request.
     pub fn answer_pings(&mut self) {
         self.socket.get_mut().plain().deadline = Instant::now() + PING_WAIT;
         let _ = self.hear(PING_WAIT);
@@ -133,8 +133,8 @@ pub fn silent(url: &str, within: Duration) -> RemoteError {
     RemoteError::Unreachable { url: url.into(), reason }
 }
 
-/// Returns the beginning of a page. `begun` is the part that came with its header. Waits briefly for the
-/// remaining part.
+/// Returns the beginning of an HTTP response's page. `begun` is the part that was received with the header.
+/// Waits briefly for more text if it is empty.
 fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     if begun.is_empty()
         && let Ok(mut stream) = stream
@@ -150,10 +150,10 @@ fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
 /// Minimum time for trying an address.
 const SHORTEST_TRIAL: Duration = Duration::from_millis(10);
 
-/// Time for reading and answering a ping that has arrived.
+/// Time limit for reading and answering a ping that has been received.
 const PING_WAIT: Duration = Duration::from_millis(20);
 
-/// Maximum delay of a page's text after its header.
+/// Maximum delay between the header and the text of a page.
 const PAGE_WAIT: Duration = Duration::from_secs(1);
 
 fn is_late(error: &io::Error) -> bool {
@@ -185,7 +185,7 @@ impl PolicyStream {
         }
     }
 
-    /// Returns the stream for reading the rest of a page. Not supported for encrypted connections.
+    /// Returns the stream from which the rest of a page is read. Encrypted connections are not supported.
     fn page(&self) -> io::Result<TcpStream> {
         match self {
             PolicyStream::Plain(stream) => stream.stream.try_clone(),
@@ -219,7 +219,7 @@ impl Write for PolicyStream {
     }
 }
 
-/// A connection on which every operation ends by a deadline, even if data arrives in small pieces.
+/// A connection on which every operation ends at a deadline, even if data are received in small pieces.
 struct DeadlineStream {
     stream: TcpStream,
     deadline: Instant,
@@ -232,7 +232,7 @@ impl DeadlineStream {
         let deadline = Instant::now() + within;
         let mut addresses = (address.host(), port).to_socket_addrs()?;
         while let Some(address) = addresses.next() {
-            // Each address gets its share of the remaining time, which must not be zero.
+            // Each address gets an equal share of the remaining time, which must not be zero.
             let left = deadline.saturating_duration_since(Instant::now());
             let share = left / (addresses.len() as u32 + 1);
             match TcpStream::connect_timeout(&address, share.max(SHORTEST_TRIAL)) {
@@ -246,7 +246,7 @@ impl DeadlineStream {
         Err(failure)
     }
 
-    /// Returns the remaining time. Zero is an error, because the system would treat it as no limit.
+    /// Returns the remaining time. Zero is an error, because the operating system would treat it as no limit.
     fn left(&self) -> io::Result<Option<Duration>> {
         match self.deadline.saturating_duration_since(Instant::now()) {
             Duration::ZERO => Err(io::ErrorKind::TimedOut.into()),

@@ -36,11 +36,11 @@ pub trait PolicyClient: Send {
 /// Protocol of a policy server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolicyProtocol {
-    /// msgpack with numpy arrays over WebSocket, as in openpi's server and client.
+    /// msgpack with numpy arrays over WebSocket, used by openpi's server and client.
     Openpi,
-    /// JSON with numpy arrays over HTTP, as in the `/act` of OpenVLA and others.
+    /// JSON with numpy arrays over HTTP, used by the `/act` endpoint of OpenVLA and others.
     Act,
-    /// Frames of msgpack over WebSocket, as in XPolicyLab's servers.
+    /// msgpack messages over WebSocket, used by XPolicyLab's servers.
     XPolicyLab,
 }
 
@@ -48,7 +48,7 @@ impl PolicyProtocol {
     pub const ALL: [PolicyProtocol; 3] =
         [PolicyProtocol::Openpi, PolicyProtocol::Act, PolicyProtocol::XPolicyLab];
 
-    /// Returns its name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             PolicyProtocol::Openpi => "openpi",
@@ -57,7 +57,7 @@ impl PolicyProtocol {
         }
     }
 
-    /// Returns its URL schemes; the encrypted one is last.
+    /// Returns the URL schemes; the encrypted one is last.
     pub fn schemes(self) -> [&'static str; 2] {
         match self {
             PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => link::SCHEMES,
@@ -65,7 +65,7 @@ impl PolicyProtocol {
         }
     }
 
-    /// Refuses to send a key unencrypted to another machine.
+    /// Returns an error if a key would be sent unencrypted to another machine.
     pub fn check_key(self, address: &PolicyAddress) -> Result<(), PolicyKeyError> {
         if address.key.is_none() || address.is_encrypted() || address.is_loopback() {
             return Ok(());
@@ -74,7 +74,7 @@ impl PolicyProtocol {
         Err(PolicyKeyError::Unencrypted { url: address.url.clone(), protocol: self.name(), encrypted })
     }
 
-    /// Returns the default preset, used if no map is given.
+    /// Returns the preset that is used if no map is given; `None` if the protocol has no default.
     pub fn preset(self) -> Option<&'static str> {
         match self {
             PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => Some(self.name()),
@@ -84,8 +84,8 @@ impl PolicyProtocol {
 
     /// Opens a client of the server at `address` for an episode of `task`.
     ///
-    /// The server must be reachable within `connect_within`. It may be busy then, and has the longer of
-    /// `connect_within` and `reply_within` for its first message.
+    /// The server must be reachable within `connect_within`, but may be busy then. The time limit for its
+    /// first message is the longer of `connect_within` and `reply_within`.
     pub fn open(
         self,
         address: &PolicyAddress,

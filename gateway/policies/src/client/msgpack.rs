@@ -1,15 +1,15 @@
-//! msgpack with numpy arrays, in the two dialects that policies' servers use.
+//! msgpack with numpy arrays, in the two dialects of policy servers.
 
 use rmpv::{Value, decode, encode};
 
 use crate::values::{Array, ReplyValue, RequestValue};
 
-/// Encoding of an array; both are maps whose keys are bytes.
+/// Encoding of an array: a map whose keys are bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialect {
-    /// `__ndarray__`, `data`, `dtype`, `shape`, as in openpi-client's own `msgpack_numpy`.
+    /// Keys `__ndarray__`, `data`, `dtype` and `shape`, as in openpi-client's module `msgpack_numpy`.
     Openpi,
-    /// `nd`, `type`, `kind`, `shape`, `data`, as in the package msgpack-numpy.
+    /// Keys `nd`, `type`, `kind`, `shape` and `data`, as in the package msgpack-numpy.
     MsgpackNumpy,
 }
 
@@ -21,12 +21,12 @@ pub fn written(request: &RequestValue, dialect: Dialect) -> Vec<u8> {
 /// Encodes a value.
 pub fn bytes_of(value: &Value) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // Writing into memory cannot fail.
+    // Writing to memory cannot fail.
     let _ = encode::write_value(&mut bytes, value);
     bytes
 }
 
-/// Converts a request to a value that can be part of another one.
+/// Converts a request to a value that can be part of another value.
 pub fn request_value(request: &RequestValue, dialect: Dialect) -> Value {
     let value = |request| request_value(request, dialect);
     match request {
@@ -60,12 +60,12 @@ fn ndarray(array: &Array, dialect: Dialect) -> Value {
     })
 }
 
-/// Reads an answer. Lists of numbers become arrays, too.
+/// Decodes an answer. Lists of numbers also become arrays.
 pub fn read_reply(bytes: &[u8]) -> Result<ReplyValue, String> {
     reply_value(read(bytes)?)
 }
 
-/// Reads exactly one value.
+/// Decodes exactly one value.
 pub fn read(mut bytes: &[u8]) -> Result<Value, String> {
     let value = decode::read_value(&mut bytes).map_err(|error| format!("no msgpack: {error}"))?;
     match bytes.is_empty() {
@@ -74,7 +74,7 @@ pub fn read(mut bytes: &[u8]) -> Result<Value, String> {
     }
 }
 
-/// Converts a value with arrays of either dialect.
+/// Converts a value that may contain arrays of either dialect.
 pub fn reply_value(value: Value) -> Result<ReplyValue, String> {
     if let Some(number) = value.as_f64() {
         return Ok(ReplyValue::number(number));
@@ -89,7 +89,7 @@ pub fn reply_value(value: Value) -> Result<ReplyValue, String> {
     }
 }
 
-/// Returns the value under `key`, which is encoded as text or as bytes.
+/// Returns the value under `key`, which may be encoded as text or as bytes.
 pub fn entry<'a>(entries: &'a [(Value, Value)], key: &str) -> Option<&'a Value> {
     entries.iter().find(|(name, _)| name.as_slice() == Some(key.as_bytes())).map(|(_, value)| value)
 }
@@ -120,7 +120,7 @@ fn of_map(entries: Vec<(Value, Value)>) -> Result<ReplyValue, String> {
     named.collect::<Result<_, String>>().map(ReplyValue::Map)
 }
 
-/// Returns a string that is encoded as text or as bytes.
+/// Returns a string that may be encoded as text or as bytes.
 pub fn text(value: &Value) -> Option<String> {
     Some(std::str::from_utf8(value.as_slice()?).ok()?.to_owned())
 }
@@ -143,7 +143,8 @@ mod tests {
     use super::*;
     use crate::values::Elements;
 
-    /// `msgpack_numpy.packb({"actions": np.float32([[1.5, -2]]), "n": np.float64(3)})` of openpi-client 0.1.2.
+    /// `msgpack_numpy.packb({"actions": np.float32([[1.5, -2]]), "n": np.float64(3)})` of openpi-client
+    /// 0.1.2.
     const KNOWN: &[u8] = include_bytes!("known.msgpack");
 
     #[test]

@@ -1,5 +1,5 @@
-//! openpi's protocol over WebSocket: the server sends its metadata, then answers each binary message with
-//! another. A text message is its error.
+//! openpi's protocol over WebSocket. The server sends its metadata, then answers each binary message with a
+//! binary message. A text message reports an error.
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ impl Openpi {
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<Openpi, RemoteError> {
-        // A server that is answering another client may delay the handshake.
+        // A server that is answering another client may delay its handshake.
         let within = connect_within.max(reply_within);
         let mut link = Openpi { socket: PolicySocket::connect(address, connect_within, within)? };
         let metadata = link.hear(within).map_err(|error| match error {
@@ -56,7 +56,7 @@ impl PolicyClient for Openpi {
         self.hear(within)
     }
 
-    /// Does nothing: a connection is an episode, and the protocol has no reset.
+    /// Does nothing: each connection is one episode, and the protocol has no reset.
     fn begin_trial(&mut self, _within: Duration) -> Result<(), RemoteError> {
         Ok(())
     }
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_server_that_says_nothing_is_not_there() {
-        // The system accepts connections; no program answers them.
+        // The operating system accepts connections, but no program answers.
         let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let url = format!("ws://{}", silent.local_addr().unwrap());
         let address = PolicyAddress { url, key: None };

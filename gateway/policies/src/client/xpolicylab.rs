@@ -1,7 +1,7 @@
-//! XPolicyLab's protocol: frames of msgpack over WebSocket, each answered by one with the same
-//! `message_id`.
+//! XPolicyLab's protocol: msgpack messages over WebSocket. Each message is answered by a message with the
+//! same `message_id`.
 //!
-//! A server has one model, which any client can restart with `reset`.
+//! A server has one model, which any client can reset with the message `reset`.
 
 use std::{
     fmt::Write,
@@ -20,16 +20,16 @@ use crate::{
     values::{ReplyValue, RequestValue},
 };
 
-/// Time limit for messages whose answer does not matter: the end of an episode, and heartbeats.
+/// Time limit for messages whose answers do not matter: the end of an episode, and heartbeats.
 const COURTESY: Duration = Duration::from_secs(2);
 
-/// Format of the observations, by XPolicyLab's name for it.
+/// Format of observations, as XPolicyLab names it.
 const DATA_FORMAT: &str = "v1.0";
 
 /// A connection to one server.
 pub struct XPolicyLab {
     socket: PolicySocket,
-    /// Unique id of this client. A server repeats its old answer to a message id that it knows.
+    /// Unique id of this client. A server repeats its earlier answer if it already knows a message id.
     evaluation: String,
     /// Name of the task.
     case: String,
@@ -64,7 +64,7 @@ impl Request {
         }
     }
 
-    /// Returns the message type of its answer.
+    /// Returns the message type of the answer to the request.
     fn answer(self) -> String {
         match self {
             Request::Reset | Request::Infer => format!("{}_result", self.name()),
@@ -93,7 +93,7 @@ impl XPolicyLab {
         let socket = PolicySocket::connect(address, connect_within, within)?;
         let case = task.to_owned();
         let mut link = XPolicyLab { socket, evaluation, case, messages: 0, trials: 0, trial: None };
-        // A server of another protocol does not answer these messages.
+        // A server with another protocol does not answer these messages.
         link.request(Request::Hello, Vec::new(), within).map_err(|error| match error {
             RemoteError::Slow { .. } => silent(url, within),
             error => error,
@@ -163,7 +163,7 @@ impl XPolicyLab {
         ])
     }
 
-    /// Returns the id of the open trial, or of the last one.
+    /// Returns the id of the open trial, or of the last trial if none is open.
     fn trial_id(&self) -> String {
         format!("{}-{}", self.case, self.trials)
     }
@@ -194,8 +194,7 @@ impl PolicyClient for XPolicyLab {
                 actions(payload).map_err(|reason| self.socket.unreadable(reason))
             }
             Err(error) => {
-                // A server that does not answer this request would not receive the end of the trial,
-                // either.
+                // A server that does not answer this request would not receive the end of the trial, either.
                 if !matches!(error, RemoteError::Failed { .. }) {
                     self.trial = None;
                 }
@@ -213,7 +212,7 @@ impl PolicyClient for XPolicyLab {
     }
 
     fn keep_alive(&mut self) {
-        // If the server is gone, the next request fails. A ping of the server is answered here as well.
+        // If the connection is broken, the next request fails. Pings from the server are also answered here.
         let _ = self.request(Request::Heartbeat, Vec::new(), COURTESY);
     }
 }
@@ -227,7 +226,7 @@ impl Drop for XPolicyLab {
     }
 }
 
-/// Returns the server's description of its failure.
+/// Returns the description of a failure that the server has sent.
 fn complaint(payload: &Value) -> String {
     let found = |key: &str| payload.as_map().and_then(|entries| entry(entries, key)).and_then(text);
     let code = found("code").unwrap_or_else(|| "error".into());
@@ -237,8 +236,8 @@ fn complaint(payload: &Value) -> String {
     }
 }
 
-/// Converts an answer to the form that maps expect: `actions` becomes one map of arrays, each with a row
-/// per action. The server sends a list of maps, one per action, or a single map.
+/// Converts an answer to the form that maps expect: `actions` becomes one map of arrays with one row per
+/// action. The server sends a list of maps with one map per action, or a single map.
 fn actions(payload: Value) -> Result<ReplyValue, String> {
     let Value::Map(entries) = payload else {
         return Err(format!("expected a payload; came a {}", kind(&payload)));
@@ -254,7 +253,7 @@ fn actions(payload: Value) -> Result<ReplyValue, String> {
     Ok(ReplyValue::Map(vec![("actions".into(), told)]))
 }
 
-/// Converts maps of one row each to one map of columns of rows.
+/// Combines maps with one row each into one map, which has a table of rows for each key.
 fn by_key(rows: Vec<Value>) -> Result<ReplyValue, String> {
     let mut columns: Vec<(String, Vec<ReplyValue>)> = Vec::new();
     for (number, row) in rows.into_iter().enumerate() {

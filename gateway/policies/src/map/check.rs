@@ -1,4 +1,4 @@
-//! Validation of a map, with advice on correct values.
+//! Validation of a map. Errors advise on correct values.
 
 use std::collections::BTreeSet;
 
@@ -17,19 +17,19 @@ use crate::{
 
 /// Maximum side of an image for a policy.
 const LONGEST_SIDE_PX: u32 = 4096;
-/// Range of rates. A row of wrist poses is one command, which has at most 25 control steps, or half a
-/// second.
+/// Range of row rates. A row of wrist poses is one command, which has at most 25 control steps (half a
+/// second).
 const RATES_HZ: [f64; 2] = [2.0, 1000.0];
 const LONGEST_HISTORY: usize = 32;
-/// Maximum number of rows: more than three minutes at 50 rows per second.
+/// Maximum number of rows in an answer: more than three minutes at 50 rows per second.
 const MAX_ROWS: usize = 10_000;
 const MAX_LEADING_AXES: usize = 8;
-/// Maximum time to wait for a policy: a day.
+/// Maximum time to wait for a policy, in seconds: one day.
 const LONGEST_S: f64 = 86400.0;
 const SHORTEST_REPLY_S: f64 = 0.001;
 
 impl PolicyMap {
-    /// Checks that the map can be followed.
+    /// Checks that the map can be used.
     pub(super) fn check(&self) -> Result<(), String> {
         let state = self.state.iter().map(|(key, names)| ("state", key, names.is_empty()));
         let action = self.action.iter().map(|(key, names)| ("action", key, names.is_empty()));
@@ -63,7 +63,7 @@ impl PolicyMap {
         check_paths(&self.action.keys().collect::<Vec<_>>())
     }
 
-    /// Returns the columns that the policy commands. Refuses a column under two keys.
+    /// Returns the columns that the policy commands. Returns an error if a column has two keys.
     fn check_action(&self) -> Result<Vec<usize>, String> {
         let told = self.told_columns();
         if told.is_empty() {
@@ -75,8 +75,8 @@ impl PolicyMap {
         }
     }
 
-    /// Refuses commands for arms and waist beside wrist poses, because inverse kinematics controls them
-    /// then.
+    /// Returns an error if arms or waist are commanded together with wrist poses, because inverse kinematics
+    /// then controls them. Also rejects two forms of a wrist's rotation.
     fn check_wrists(&self, told: &[usize]) -> Result<(), String> {
         for (side, wrist) in WRISTS.iter().enumerate() {
             let forms = RotationForm::ALL.into_iter().map(|form| wrist_rotation(side, form).start);
@@ -102,7 +102,8 @@ impl PolicyMap {
         }
     }
 
-    /// Refuses setpoints of motors without gains, and beside commands for the robot's controller.
+    /// Returns an error if motor setpoints lack gains, or are combined with commands for the robot's
+    /// controller.
     fn check_motors(&self, told: &[usize]) -> Result<(), String> {
         let Some(other) = told.iter().find(|column| !motors().contains(column)) else {
             let needed = ["motor_position", "motor_kp", "motor_kd"];
@@ -138,7 +139,7 @@ impl PolicyMap {
         WRISTS.into_iter().enumerate().filter(|(side, _)| is_told(*side)).map(|(_, wrist)| wrist).collect()
     }
 
-    /// Checks that differences are only used for columns that are commanded and that are positions.
+    /// Checks that differences are used only for positions that the policy commands.
     fn check_delta(&self, told: &[usize]) -> Result<(), String> {
         let wrists = self.told_wrists(told);
         for NamedColumns { name, columns, .. } in &self.chunk.delta {
@@ -203,7 +204,7 @@ impl PolicyMap {
         }
     }
 
-    /// Checks that the keys of one answer for all robots name every robot.
+    /// Checks that keys name every robot if one answer is for all robots.
     fn check_keys(&self) -> Result<(), String> {
         if self.answer == AnswerScope::One {
             return Ok(());
@@ -220,7 +221,7 @@ impl PolicyMap {
     }
 }
 
-/// Checks that no key leads through another or to the same place, for any robot.
+/// Checks that, for every robot, no key leads to the same place as another key or through it.
 fn check_paths(keys: &[&String]) -> Result<(), String> {
     let robots: BTreeSet<&str> =
         tasks::cohub().iter().flat_map(|task| &task.robots).map(|robot| robot.name).collect();

@@ -1,4 +1,4 @@
-//! Policy maps: which values and images a policy gets under which key, and which it returns. A map is a
+//! Policy maps: the values and images that a policy gets, those that it returns, and their keys. A map is a
 //! small TOML file or a preset.
 
 mod check;
@@ -18,7 +18,7 @@ use crate::{
     named_columns::{CommandRow, NamedColumns, StateRow, joined},
 };
 
-/// Built-in maps by name; each file is written out in full and explained.
+/// Built-in maps by name. Each file states and explains all entries.
 pub const PRESETS: [(&str, &str); 3] = [
     ("openpi", include_str!("presets/openpi.toml")),
     ("xpolicylab", include_str!("presets/xpolicylab.toml")),
@@ -39,29 +39,29 @@ pub struct PolicyMap {
     pub leading_axes: usize,
     /// Time limit for connecting to a server, in seconds.
     pub connect_s: f64,
-    /// Time limit for an answer, in seconds; the first of an episode may take longer.
+    /// Time limit for an answer, in seconds. The first answer of an episode may take longer.
     pub reply_s: f64,
     pub images: BTreeMap<String, ImageKey>,
     pub state: BTreeMap<String, Vec<NamedColumns<StateRow>>>,
     pub prompt: BTreeMap<String, PromptForm>,
     pub action: BTreeMap<String, Vec<NamedColumns<CommandRow>>>,
     pub chunk: Chunk,
-    /// History of observations; left out if a policy only gets the present one.
+    /// History of observations; `None` if a policy only gets the present one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub history: Option<HistorySpan>,
 }
 
-/// Robots whose images and joints a policy gets.
+/// Robots whose images and joints a request contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scope {
-    /// The answer contains only the robot of the request.
+    /// Only the robot of the request.
     Local,
-    /// All robots, under keys with their names.
+    /// All robots, under keys that contain their names.
     Global,
 }
 
-/// Robots that an answer moves.
+/// Robots that an answer commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerScope {
@@ -71,7 +71,7 @@ pub enum AnswerScope {
     All,
 }
 
-/// Instruction that a policy gets.
+/// Instruction that a request contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Words {
@@ -81,12 +81,12 @@ pub enum Words {
     Joint,
 }
 
-/// Source and form of an image.
+/// Source and format of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageKey {
     pub camera: CameraName,
-    /// Width and height in pixels; left out for the size of the camera.
+    /// Width and height in pixels; `None` for the camera's size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
     #[serde(default)]
@@ -100,7 +100,7 @@ pub struct ImageKey {
 #[serde(rename_all = "snake_case")]
 pub enum CameraName {
     Egocentric,
-    /// A view that robots themselves do not have.
+    /// A view that the robots themselves do not have.
     ThirdPerson,
 }
 
@@ -116,12 +116,13 @@ pub enum PromptForm {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// The whole image as large as fits, centred on black, as in `resize_with_pad` of openpi-client.
+    /// Scales the whole image to the largest size that fits, centred on black, like `resize_with_pad` of
+    /// openpi-client.
     #[default]
     Pad,
-    /// Stretched to the new size, regardless of the aspect ratio.
+    /// Stretches the image to the new size and ignores the aspect ratio.
     Stretch,
-    /// The largest centred part with the right aspect ratio.
+    /// Uses the largest centred part with the right aspect ratio.
     Crop,
 }
 
@@ -140,49 +141,49 @@ pub enum Layout {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chunk {
-    /// Required number of rows.
+    /// Required number of rows in an answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<usize>,
-    /// Number of rows to execute, from the first.
+    /// Number of rows to execute, from the first row on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub execute: Option<usize>,
-    /// Rows per second; if left out, one per control step.
+    /// Rows per second; `None` for one row per control step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     #[serde(default, skip_serializing_if = "is_default")]
     pub between: Between,
-    /// Columns that are differences to the state at the time of the request.
+    /// Columns that are differences from the state at the time of the request.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delta: Vec<NamedColumns<CommandRow>>,
     #[serde(default, skip_serializing_if = "is_default")]
     pub wrist_frame: WristFrame,
 }
 
-/// Commands within the control steps that one row lasts.
+/// Commands in the control steps that one row spans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Between {
-    /// Linear interpolation from the previous row to this one. Velocities change at once.
+    /// Linear interpolation from the previous row to this one. Velocities change immediately.
     #[default]
     Interpolate,
-    /// This row in every step.
+    /// The values of this row in every control step.
     Hold,
 }
 
-/// Frame in which wrist poses are given.
+/// Frame of wrist poses in an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WristFrame {
-    /// The pelvis frame: hands move with the pelvis.
+    /// The pelvis frame. Hands move with the pelvis.
     #[default]
     Pelvis,
-    /// Pose of the robot at the episode's start, by its own odometry: hands stay fixed in the world.
+    /// The robot's pose at the episode's start, by its own odometry. Hands stay fixed in the world.
     Start,
-    /// The observed wrist frame itself; such poses are always differences. Hands stay fixed in the world.
+    /// The observed wrist frame itself. Poses in it are always differences. Hands stay fixed in the world.
     Wrist,
 }
 
-/// Extent of the history that a policy gets.
+/// Extent of the history that a request contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HistorySpan {
@@ -195,11 +196,11 @@ pub struct HistorySpan {
     pub form: HistoryForm,
 }
 
-/// Combination of the observations of several moments, oldest first.
+/// Combination of observations from several times, oldest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HistoryForm {
-    /// Arrays with an axis of moments, after the leading axes.
+    /// Arrays with an axis for time, after the leading axes.
     #[default]
     Stack,
     /// Lists of arrays.
@@ -214,12 +215,12 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Columns of an answer that are differences to the observed state.
+/// Columns of an answer that are differences from the observed state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeltaColumns {
     /// Columns of an action row.
     pub row_columns: Vec<usize>,
-    /// The left and the right wrist.
+    /// True for the left and the right wrist if its pose is a difference.
     pub wrists: [bool; 2],
 }
 
@@ -244,10 +245,10 @@ fn preset_names() -> String {
 }
 
 impl PolicyMap {
-    /// Returns the preset called `name`, or reads the map from the file of that name.
+    /// Returns the preset called `name`, or reads the map from the file with that name.
     ///
-    /// A file may begin with `preset = "NAME"`. Its own entries then replace those of the preset, whole
-    /// tables at a time.
+    /// A file may begin with `preset = "NAME"`. Its entries then replace entries of the preset; tables are
+    /// replaced as a whole.
     pub fn find(name: &str) -> Result<PolicyMap, MapError> {
         let path = Path::new(name);
         let text = match preset(name) {
@@ -273,12 +274,12 @@ impl PolicyMap {
         whole.try_into().map_err(unreadable)
     }
 
-    /// Returns the rows per second of an answer.
+    /// Returns the number of rows per second in an answer.
     pub fn rate_hz(&self) -> f64 {
         self.chunk.rate_hz.unwrap_or(CONTROL_HZ)
     }
 
-    /// Returns the columns of an answer that are differences.
+    /// Returns the columns of an answer that are differences from the observed state.
     pub fn delta(&self) -> DeltaColumns {
         let delta = &self.chunk.delta;
         let of_row = joined(delta).into_iter().filter(|column| *column < ACTION_ROW_LEN);
@@ -288,7 +289,7 @@ impl PolicyMap {
         }
     }
 
-    /// Returns the robot indices of each request, for a task with `robots` robots.
+    /// Returns the robot indices of each request in a task with `robots` robots.
     pub fn queries(&self, robots: usize) -> Vec<Vec<usize>> {
         match self.answer {
             AnswerScope::One => (0..robots).map(|robot| vec![robot]).collect(),
@@ -301,17 +302,17 @@ impl PolicyMap {
         self.told_columns().iter().any(|column| wrists().contains(column))
     }
 
-    /// Returns true if the policy commands the setpoints of motors.
+    /// Returns true if the policy commands motor setpoints.
     pub fn drives_motors(&self) -> bool {
         self.told_columns().iter().any(|column| motors().contains(column))
     }
 
-    /// Returns the columns that an answer commands, in no particular order.
+    /// Returns the columns that an answer contains, in no particular order.
     pub fn told_columns(&self) -> Vec<usize> {
         self.action.values().flat_map(|names| joined(names)).collect()
     }
 
-    /// Returns the extra information that the policy gets and the benchmark's own policies do not.
+    /// Returns the extra information that the policy gets and the benchmark withholds from its own policies.
     pub fn shown(&self) -> Vec<ExtraInformation> {
         let columns: Vec<usize> = self.state.values().flat_map(|names| joined(names)).collect();
         let mut shown = extra_columns(&columns);
@@ -324,8 +325,8 @@ impl PolicyMap {
         shown
     }
 
-    /// Returns the names of [`PolicyMap::shown`] and of other episode data that the benchmark's policies
-    /// do not get.
+    /// Returns the names of [`PolicyMap::shown`], and of other episode data that the benchmark withholds from
+    /// its own policies.
     pub fn extra_information(&self) -> Vec<String> {
         let of_moment = [("episode", "episode number"), ("step", "clock")];
         let is_named = |column: &str| self.state.values().flatten().any(|named| named.name == column);
@@ -340,7 +341,7 @@ impl PolicyMap {
     }
 }
 
-/// Returns the file of the preset called `name`.
+/// Returns the text of the preset called `name`.
 pub fn preset(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
@@ -349,7 +350,7 @@ pub fn preset(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    /// Reads the map from a file with this text.
+    /// Reads the map from a file that contains `text`.
     pub(super) fn read(text: &str) -> Result<PolicyMap, MapError> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();

@@ -1,4 +1,4 @@
-//! The history of observations that a policy gets.
+//! The history of observations that a request contains.
 
 use std::collections::VecDeque;
 
@@ -8,23 +8,23 @@ use tandem_tools_spec::ExtraInformation;
 use super::PolicyObservation;
 use crate::{columns::EpisodeMoment, map::PolicyMap};
 
-/// Observations of an episode that a policy may still need.
+/// Observations of an episode that later requests may still need.
 pub struct ObservationHistory {
-    /// Number of observations for a policy, and number of rows between two of them.
+    /// Number of observations in a request. `stride` is the number of executed rows between two of them.
     length: usize,
     stride: usize,
-    /// Extra information in the observations that the benchmark's own policies do not get.
+    /// Extra information in the observations, which the benchmark withholds from its own policies.
     shown: Vec<ExtraInformation>,
     episode: u32,
-    /// Latest observation, and the number of rows executed before.
+    /// Latest observation. `present_rows` is the number of rows that were executed before it.
     present: PolicyObservation,
     present_rows: usize,
-    /// Earlier observations with their row numbers, oldest first.
+    /// Earlier observations with their numbers of executed rows, oldest first.
     past: VecDeque<(usize, PolicyObservation)>,
 }
 
 impl ObservationHistory {
-    /// Takes the first observation of the episode with this number.
+    /// Makes the first observation of the episode with this number.
     pub fn begin(
         map: &PolicyMap,
         episode: &mut dyn LocalEpisode,
@@ -62,7 +62,7 @@ impl ObservationHistory {
         let before = std::mem::replace(&mut self.present, observation);
         self.past.push_back((self.present_rows, before));
         self.present_rows = rows;
-        // The latest of the outdated observations is kept for moments without one.
+        // The latest outdated observation is kept for times without an observation.
         let oldest = rows.saturating_sub((self.length - 1) * self.stride);
         while self.length == 1 && !self.past.is_empty()
             || self.past.get(1).is_some_and(|(at, _)| *at <= oldest)
@@ -71,15 +71,15 @@ impl ObservationHistory {
         }
     }
 
-    /// Returns the row numbers, above `from` and below `to`, after which observations are needed so that
+    /// Returns the numbers of executed rows between `from` and `to` at which observations are needed, so that
     /// a request after `to` rows has its history.
     pub fn looks_between(&self, from: usize, to: usize) -> Vec<usize> {
         let past = (1..self.length).rev().filter_map(|back| to.checked_sub(back * self.stride));
         past.filter(|rows| *rows > from).collect()
     }
 
-    /// Returns the observations for the policy, oldest first. The first observation also stands in for the
-    /// time before it.
+    /// Returns the observations for a request, oldest first. The first observation also represents times
+    /// before it.
     pub fn shown(&self) -> Vec<&PolicyObservation> {
         let at = |back: usize| {
             let wanted = self.present_rows.saturating_sub(back * self.stride);
@@ -125,7 +125,7 @@ mod tests {
         assert_eq!(three.looks_between(0, 10), [2, 6]);
         assert_eq!(after(&mut three, &[2, 6, 10]), [2.0, 6.0, 10.0]);
         assert_eq!(three.past.len(), 2, "older ones are forgotten");
-        // The chunk is shorter than the history and its ends do not line up, so the last earlier
+        // The chunk is shorter than the history, and its ends are at other rows, so the last earlier
         // observation is used.
         assert!(three.looks_between(10, 13).is_empty());
         assert_eq!(after(&mut three, &[13]), [2.0, 6.0, 13.0]);

@@ -18,7 +18,7 @@ use crate::{
     values::{Array, Elements, RequestValue},
 };
 
-/// The instructions of a task in the form for policies.
+/// The instructions of a task, in the form for requests.
 #[derive(Clone, Debug)]
 pub struct TaskInstructions {
     /// The task's id.
@@ -32,7 +32,7 @@ pub struct TaskInstructions {
 }
 
 impl TaskInstructions {
-    /// Collects the instructions of `task` in the words `words`.
+    /// Collects the instructions of `task`, worded as `words`.
     pub fn of(task: &Task, words: TaskWords) -> TaskInstructions {
         TaskInstructions {
             task: task.id.clone(),
@@ -43,8 +43,8 @@ impl TaskInstructions {
     }
 }
 
-/// Builds the request for robot number `robot`, or for all robots if it is `None`, from observations with
-/// the oldest first.
+/// Builds the request for the robot with the index `robot`, or for all robots if it is `None`. The
+/// observations `shown` are in order, oldest first.
 pub fn request(
     map: &PolicyMap,
     instructions: &TaskInstructions,
@@ -63,7 +63,7 @@ pub fn request(
             CameraName::ThirdPerson => {
                 let seen: Vec<&Picture> =
                     shown.iter().filter_map(|moment| moment.third_person.as_deref()).collect();
-                // In all other cases no image was taken.
+                // Otherwise, no image was taken.
                 if !seen.is_empty() {
                     let seen = seen.into_iter().map(|picture| pixels(picture, image));
                     request.put(key, over_time(seen.collect(), map));
@@ -92,8 +92,8 @@ pub fn request(
     request
 }
 
-/// Returns keys with the robots whose inputs they hold: the robot named in the key, else the one of the
-/// request.
+/// Returns concrete keys, with the robots whose inputs they contain: the robot named in the key, or else the
+/// robot of the request.
 fn of_robots(
     key: &str,
     map: &PolicyMap,
@@ -117,7 +117,7 @@ fn floats(state_values: &[f64], columns: &[usize]) -> Array {
     Array { shape: vec![columns.len()], elements: Elements::Floats(floats) }
 }
 
-/// Combines the arrays of all moments under one key in the form of the map.
+/// Combines the arrays of all times under one key, as the map specifies.
 fn over_time(moments: Vec<Array>, map: &PolicyMap) -> RequestValue {
     let with_leading_axes = |array: Array| {
         let leading = std::iter::repeat_n(1, map.leading_axes);
@@ -145,7 +145,7 @@ mod tests {
         }
     }
 
-    /// Lists keys with shapes or texts, with maps flattened.
+    /// Lists keys with shapes or texts. Maps are flattened.
     fn outline(request: &RequestValue) -> Vec<String> {
         match request {
             RequestValue::Map(entries) => entries

@@ -1,4 +1,4 @@
-//! Observation at one moment, limited to the data that a policy may get.
+//! Observation at one time, limited to the data that a policy may get.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use tandem_tools_spec::{ExtraInformation, Observe, Tool as _};
 
 use crate::columns::{EpisodeMoment, blank_state_values, held_row, state_values};
 
-/// Observation of all robots at one moment.
+/// Observation of all robots at one time.
 #[derive(Clone)]
 pub struct PolicyObservation {
     /// One entry per robot, in the task's order.
     pub robots: Vec<RobotInputs>,
-    /// Third-person image, if the policy gets it.
+    /// Third-person image; `None` if the policy does not get it.
     pub third_person: Option<Arc<Picture>>,
 }
 
@@ -27,7 +27,7 @@ pub struct RobotInputs {
     pub state_values: Vec<f64>,
 }
 
-/// Returns the error for a reply without the robot's own state, which no placeholder can replace.
+/// Returns the error for a reply that withholds the robot's own state, for which there is no substitute.
 pub fn withheld(tool: &'static str) -> PlayerError {
     let reason = "the reply withholds gravity or odometry, which who asks a policy has to have".into();
     PlayerError::Call { tool, reason }
@@ -38,9 +38,9 @@ const WIDTH_PX: u32 = 320;
 const HEIGHT_PX: u32 = 240;
 
 impl PolicyObservation {
-    /// Observes all robots, and the third-person view if it is part of `shown`.
+    /// Observes all robots. Also observes the third-person view if `shown` contains it.
     ///
-    /// `shown` names the extra information for the policy that the benchmark's own policies do not get.
+    /// `shown` is the extra information for the policy, which the benchmark withholds from its own policies.
     pub fn take(
         episode: &mut dyn LocalEpisode,
         shown: &[ExtraInformation],

@@ -8,7 +8,7 @@ use crate::{
     values::{Array, Elements},
 };
 
-/// Returns the image in the requested size, as an array of bytes.
+/// Returns the image in the requested size as an array of bytes.
 pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> Array {
     if [picture.width, picture.height] == size_px {
         return arranged(picture.rgb().to_vec(), size_px, layout);
@@ -41,13 +41,13 @@ fn fitted(picture: &Picture, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
     }
 }
 
-/// Returns the reduction factor of each side.
+/// Returns the reduction factors of width and height.
 fn shrinking(picture: &Picture, size_px: [u32; 2]) -> [f64; 2] {
     let [width, height] = size_px.map(f64::from);
     [f64::from(picture.width) / width, f64::from(picture.height) / height]
 }
 
-/// Converts bytes in row-major order with colours last to the requested axis order.
+/// Converts bytes in row-major order, with colours last, to the requested axis order.
 fn arranged(rgb: Vec<u8>, [width, height]: [u32; 2], layout: Layout) -> Array {
     let [width, height] = [width as usize, height as usize];
     match layout {

@@ -1,5 +1,5 @@
-//! A robot's description: a TOML file that adapts third-party MJCF. It maps that file's joints to a
-//! robot's, places wrists and camera, and adds data of the drives that the MJCF lacks.
+//! A robot's description: a TOML file that adapts third-party MJCF. It maps the joints of the MJCF to those
+//! of a robot, defines wrists and camera, and adds drive data that the MJCF lacks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(super) struct RobotDescription {
     pub model: PathBuf,
     /// Embedded robot that supplies missing efforts, speed limits, armatures and dry frictions of joints.
     pub like: Option<String>,
-    /// Names of joints in the MJCF, by published name, where they differ.
+    /// Names of joints in the MJCF that differ from the published names, by published name.
     #[serde(default)]
     pub joints: BTreeMap<String, String>,
     /// Fixed angles of MJCF joints that are not moved, by their MJCF names.
@@ -52,7 +52,7 @@ pub(super) struct BodyFrame {
     pub quaternion_wxyz: [f64; 4],
 }
 
-/// A camera that looks ahead of a body, along its x axis, and down.
+/// A camera that looks along the x axis of a body, tilted down.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HeadCamera {

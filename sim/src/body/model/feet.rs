@@ -11,15 +11,15 @@ use crate::body::layout::{LEG_JOINTS, LEGS, joint_names};
 use crate::mjcf::{BodyTree, Document, Geom};
 use crate::{Sides, SimError};
 
-/// Angle from which a sole counts as tilted with all joints at 0. Curved soles are tilted by less.
+/// Tilt above which a sole counts as tilted with all joints at 0. Curved soles are tilted by less.
 const MIN_TILT_RAD: f32 = 0.05;
-/// Cosine of the angle up to which a face of a foot points down.
+/// Cosine of the maximum angle from straight down at which a face of a foot points down.
 const DOWN_COSINE: f32 = 0.7;
-/// Cosine of the angle up to which faces are one plane.
+/// Cosine of the maximum angle between faces of one plane.
 const PLANE_COSINE: f32 = 0.9998;
-/// Share of its outline that the largest plane of a flat sole has.
+/// Minimum share of its outline that the largest plane of a flat sole covers.
 const FLAT_SHARE: f32 = 0.3;
-/// Steps around a round shape.
+/// Number of points around a round shape.
 const ROUND_STEPS: u32 = 16;
 
 /// Puts the origins of all bodies on the axes of their joints, and gives the feet frames along their soles: x
@@ -112,7 +112,7 @@ fn surface_points_m(shape: &SharedShape) -> Vec<Vector> {
     }
 }
 
-/// Returns the middles of the areas on which the feet stand.
+/// Returns the middles of the areas on which the feet rest.
 pub(super) fn find_soles(
     document: &Document,
     tree: &BodyTree,

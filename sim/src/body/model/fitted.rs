@@ -54,7 +54,7 @@ struct Fitting {
     description: RobotDescription,
     like: Option<RobotModel>,
     g1: RobotModel,
-    /// All reasons to refuse the robot.
+    /// All reasons for refusing the robot.
     refused: Vec<SimError>,
 }
 
@@ -133,7 +133,7 @@ impl Fitting {
         Ok(model)
     }
 
-    /// Leaves out everything in the file but the robot, with notes.
+    /// Removes all content of the file except the robot, and adds notes.
     fn keep_robot(&mut self, document: &mut Document) -> Result<(), SimError> {
         let trees = document.trees().map_err(|error| self.all_with(error))?;
         let robot = main_tree(document, &trees).map_err(|error| self.all_with(error))?;
@@ -161,8 +161,8 @@ impl Fitting {
         Ok(())
     }
 
-    /// Checks that every joint of the file has a use or is held, and that every name of the description
-    /// is one of the file's joints.
+    /// Checks that every joint of the file is used or held, and that every name in the description is one of
+    /// the file's joints.
     fn check_joints_of(&mut self, document: &Document) {
         let RobotDescription { model, joints, held_rad, .. } = &self.description;
         let model = model.display();
@@ -202,8 +202,8 @@ impl Fitting {
         joints.iter().find(|(_, name)| *name == own).map_or(own, |(published, _)| published).into()
     }
 
-    /// Gives joints their published names and their ranges, and makes held joints rigid. Returns the limits
-    /// by published name, and removes actuators and keys from the document.
+    /// Gives joints their published names and their ranges, and makes held joints rigid. Removes actuators
+    /// and keys from the document. Returns the limits by published name.
     fn rename_joints(
         &self,
         document: &mut Document,
@@ -332,7 +332,7 @@ impl Fitting {
         }
     }
 
-    /// Checks that there are only the legs' own joints between pelvis and feet.
+    /// Checks that only the legs' joints are between pelvis and feet.
     fn check_legs(&mut self, document: &Document, tree: &BodyTree, joints: &[JointModel]) -> bool {
         let mut wrong = Vec::new();
         for leg in LEGS.map(|first| &joints[first..first + LEG_JOINTS]) {
@@ -381,7 +381,7 @@ fn has_arm(document: &Document, side: Side) -> bool {
     joints.any(|joint| joint.name.as_ref().is_some_and(|name| arm.contains(name)))
 }
 
-/// Returns a camera with the lens of the G1's: its y axis points up, and it looks along -z.
+/// Returns a camera with the G1's lens: its y axis points up, and it looks along -z.
 fn head_camera(camera: &HeadCamera, g1: &MjcfCamera) -> MjcfCamera {
     let (sine, cosine) = camera.down_deg.to_radians().sin_cos();
     let (right, up) = (-Vector::Y, Vector::new(sine, 0.0, cosine));

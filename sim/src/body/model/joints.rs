@@ -22,7 +22,7 @@ pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec
         if joints.iter().any(|joint| joint.link == link) {
             return Err(refuse("has two actuators; put both into one"));
         }
-        // A joint's own coordinate follows seven of the root, and one of each joint before it.
+        // The coordinate of a joint follows seven coordinates of the root, and one of each joint before it.
         let rest_rad = rest.get(6 + link).copied().unwrap_or(0.0) as f32;
         let joint = match &tree.links[link].joint {
             LinkJoint::Hinge(joint) => joint_model(joint, &actuator, link, rest_rad),
@@ -71,7 +71,7 @@ fn check_legs(found: &[JointModel], names: &[String]) -> Result<(), String> {
 
 /// Returns the link that carries a joint of the published order; `joints` are the earlier joints.
 fn carrier(joints: &[JointModel], index: usize) -> usize {
-    // The last joint of a group in the tree, for any order of its joints.
+    // The last joint of a group in the tree, for any order of the group's joints.
     let end = |first: usize, count: usize| {
         joints[first..first + count].iter().map(|joint| joint.link).max().unwrap_or_default()
     };
@@ -87,7 +87,7 @@ fn carrier(joints: &[JointModel], index: usize) -> usize {
 }
 
 impl JointModel {
-    /// Creates a joint that a robot lacks, in the link where it would be.
+    /// Creates the joint that a robot lacks, on the link where it would be.
     fn lacking(name: String, link: usize) -> JointModel {
         JointModel {
             name,

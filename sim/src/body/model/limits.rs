@@ -1,5 +1,5 @@
-//! Limits of the joints of third-party MJCF: ranges, efforts and rest angles, in whichever place the file
-//! has them.
+//! Joint limits of third-party MJCF: ranges, efforts and rest angles, from any place in the file that has
+//! them.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::{JointModel, RobotModel};
 use crate::SimError;
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyLink, Document};
 
-/// Data of a joint that the file gives in places other than the joint itself.
+/// Data of a joint that the file gives outside the joint element.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FileLimits {
     effort_range_n_m: Option<[f64; 2]>,
@@ -19,7 +19,7 @@ pub(super) struct FileLimits {
     rest_rad: Option<f64>,
 }
 
-/// Returns the limits by the file's names of joints.
+/// Returns the limits by the joint names of the file.
 pub(super) fn limits_of_file(document: &Document) -> Result<BTreeMap<String, FileLimits>, SimError> {
     let mut found: BTreeMap<String, FileLimits> = BTreeMap::new();
     for (joint, rest_rad) in rest_rad(document)? {
@@ -40,8 +40,7 @@ pub(super) fn limits_of_file(document: &Document) -> Result<BTreeMap<String, Fil
     Ok(found)
 }
 
-/// Returns the range of an actuator's efforts. For a motor without such a range it is the range of its
-/// commands.
+/// Returns the effort range of an actuator. For a motor without one, it is the control range.
 fn effort_range_n_m(actuator: &Actuator) -> Option<[f64; 2]> {
     let commanded = || {
         let [low, high] = actuator.control_range?.map(|command| command * actuator.gear);
@@ -66,7 +65,7 @@ fn rest_rad(document: &Document) -> Result<BTreeMap<String, f64>, SimError> {
     Ok(angles_rad)
 }
 
-/// Sources of a joint's data beside its file.
+/// Sources of a joint's data besides its file.
 pub(super) struct JointSources<'a> {
     /// Name of the description in messages.
     pub file: &'a str,
@@ -77,8 +76,8 @@ pub(super) struct JointSources<'a> {
 }
 
 impl JointSources<'_> {
-    /// Returns a joint with the data of the file and the description, and the reasons to refuse it; its
-    /// effort is 0 if neither has a limit. The parts that depend on the robot's size follow later.
+    /// Returns a joint with the data of the file and the description, and the reasons for refusing it. The
+    /// effort is 0 if neither source has a limit. Parts that depend on the robot's size are set later.
     pub(super) fn joint(
         &self,
         joint: &AxisJoint,
@@ -114,7 +113,7 @@ impl JointSources<'_> {
         };
         let given = described.effort_n_m.get(name).copied();
         let effort = given.or(of_file).or(like.as_ref().map(|like| like.effort_n_m));
-        // The joints without a limit are reported together.
+        // Joints without a limit are reported together.
         let without = if wrong.is_empty() { 0.0 } else { 1.0 };
         (self.joint_model(joint, link, limits, effort.unwrap_or(without), like.as_ref()), wrong)
     }

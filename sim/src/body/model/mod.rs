@@ -1,5 +1,5 @@
-//! A robot as its MJCF file describes it: links, joints with gains and limits, sites, cameras,
-//! self-collision pairs.
+//! A robot as described by its MJCF file: links, joints with gains and limits, sites, cameras, self-collision
+//! pairs.
 
 mod description;
 mod draft;
@@ -40,7 +40,8 @@ pub struct LinkModel {
 }
 
 /// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published order
-/// that the robot lacks is rigid: it is at 0 and has a zero axis, so that no force has a moment about it.
+/// that the robot lacks is rigid: its coordinate is 0 and its axis is zero, so that no force has a moment
+/// about it.
 #[derive(Clone, Debug)]
 pub struct JointModel {
     pub name: String,
@@ -55,7 +56,7 @@ pub struct JointModel {
     pub kp_n_m_rad: f32,
     pub kd_n_m_s_rad: f32,
     pub effort_n_m: f32,
-    /// Speed at which the motor can push no further; infinite if the file gives none.
+    /// Speed at which the motor exerts no torque in the direction of motion; infinite if the file gives none.
     pub speed_limit_rad_s: f32,
     /// Coordinate in the file's first keyframe.
     pub rest_rad: f32,
@@ -75,14 +76,14 @@ pub struct SiteModel {
     pub link_from_site: Pose,
 }
 
-/// A robot that can be put into a world any number of times.
+/// A robot that can be added to a world any number of times.
 #[derive(Clone, Debug)]
 pub struct RobotModel {
     /// Parents before children; 0 is the pelvis.
     pub links: Vec<LinkModel>,
     /// Joints in published order.
     pub joints: Vec<JointModel>,
-    /// The frames that tasks give targets for.
+    /// Frames for which tasks give targets.
     pub wrists: Sides<SiteModel>,
     /// Centres of the soles.
     pub soles: Sides<SiteModel>,
@@ -100,7 +101,7 @@ pub struct RobotModel {
     /// Link pairs that never touch, smaller index first.
     excluded: BTreeSet<(usize, usize)>,
     pub hands: Sides<HandLinks>,
-    /// Elements of its file that are only approximated relative to MuJoCo.
+    /// Elements of the file that only approximate MuJoCo.
     pub approximations: Vec<String>,
 }
 
@@ -109,7 +110,7 @@ pub struct RobotModel {
 pub struct HandLinks {
     /// Link that carries palm and wrist.
     pub wrist: usize,
-    /// Middle of the palm, where loads of the hand act, in that link's frame.
+    /// Middle of the palm, where loads of the hand act, in the frame of the wrist's link.
     pub palm_in_wrist_m: Vector,
     pub thumb: Vec<usize>,
     pub fingers: Vec<usize>,
@@ -137,15 +138,15 @@ impl RobotModel {
         world_from_link
     }
 
-    /// Returns the extent of the robot's colliding shapes along a world direction (a unit vector) from
-    /// the world's origin, with its links at these poses.
+    /// Returns the extent of the robot's colliding shapes along a world direction (a unit vector) from the
+    /// world's origin, for these link poses.
     pub fn reach_m(&self, world_from_link: &[Pose], direction: Vector) -> f32 {
         let links = self.links.iter().zip(world_from_link);
         links.map(|(link, pose)| link.solid.reach_m(pose, direction)).fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Returns the joint at a leg's hip: pitch or roll, whichever is nearer to the foot. The thigh turns
-    /// about its origin.
+    /// Returns the joint of a leg's hip that is nearer to the foot: pitch or roll. The thigh turns about its
+    /// origin.
     pub fn hip(&self, side: Side) -> usize {
         let [pitch, roll] = [LEGS[side], LEGS[side] + 1];
         if self.joints[pitch].link > self.joints[roll].link { pitch } else { roll }
@@ -157,8 +158,8 @@ impl RobotModel {
         arm.map(|joint| joint.link).min().unwrap_or_default()
     }
 
-    /// Returns the axis about which a foot rolls if its ankle has no joint for it: along the middle of its
-    /// sole, with an origin there. No motor acts about it. `None` for an ankle that rolls.
+    /// Returns origin and direction of the axis about which a foot rolls if its ankle has no roll joint:
+    /// along the middle of the sole. No motor acts about it. Returns `None` for an ankle that rolls.
     pub fn sole_axis(&self, side: Side, foot: Pose) -> Option<(Vector, Vector)> {
         let rolls = self.joints[LEGS[side] + LEG_JOINTS - 1].exists();
         (!rolls).then(|| (foot * self.soles[side].link_from_site.translation, foot.rotation * Vector::X))

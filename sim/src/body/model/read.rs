@@ -1,5 +1,5 @@
-//! Reading of a robot's file: a mechanism like any other, and on top of it the layout of a robot. The
-//! layout consists of the joints and their order, hands, soles, camera and stance.
+//! Parsing of a robot's file: a mechanism, and the layout of a robot on top of it. The layout consists of the
+//! joints and their order, hands, soles, camera and stance.
 
 use std::collections::BTreeSet;
 
@@ -27,10 +27,10 @@ impl RobotModel {
         RobotModel::of(&Document::parse(file, xml)?)
     }
 
-    /// Builds the robot of a document that meets the requirements on a robot. These are one free root
-    /// body, hinges with position actuators and the published joint names, and sites `left_wrist`,
-    /// `right_wrist`, `left_foot` and `right_foot`. It also needs a camera `egocentric` and a first
-    /// keyframe to stand in. Its waist, arms and hands may lack joints.
+    /// Builds a robot from a document that meets the requirements. These are one free root body, hinges with
+    /// position actuators and the published joint names, and sites `left_wrist`, `right_wrist`, `left_foot`
+    /// and `right_foot`. A camera `egocentric` and a first keyframe for the stance are also required. Waist,
+    /// arms and hands may lack joints.
     ///
     /// # Errors
     ///
@@ -43,7 +43,7 @@ impl RobotModel {
     }
 }
 
-/// Builds the robot of a tree whose joints and soles are known.
+/// Builds a robot from a tree whose joints and soles are known.
 pub(super) fn assemble(
     document: &Document,
     tree: &BodyTree,
@@ -71,15 +71,16 @@ pub(super) fn assemble(
     })
 }
 
-/// Returns the joints of a leg that exist, in the order of the tree; `first` is the first in published order.
+/// Returns the existing joints of a leg, in the order of the tree; `first` is the first joint in published
+/// order.
 fn leg_chain(joints: &[JointModel], first: usize) -> Vec<usize> {
     let mut chain: Vec<usize> = (first..first + LEG_JOINTS).filter(|joint| joints[*joint].exists()).collect();
     chain.sort_by_key(|joint| joints[*joint].link);
     chain
 }
 
-/// Returns the tree of a robot. Other content of the file would not be included when the robot is put
-/// into a world, so it is an error.
+/// Returns the tree of a robot. Other content of the file is an error, since it would not be added to a world
+/// with the robot.
 pub(super) fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
     let mut trees = document.trees()?.into_iter();
     let world = trees.next().into_iter().flat_map(|world| world.links);
@@ -160,8 +161,8 @@ pub(super) fn sites(
     Ok(Sides { left: site(Side::Left)?, right: site(Side::Right)? })
 }
 
-/// Returns the points of a foot that rest on the floor. For a sphere it is its lowest point, for any
-/// other shape the lower corners of its box. Points of shapes that end higher are left out.
+/// Returns the points of a foot that rest on the floor: the lowest point of a sphere, and the lower corners
+/// of the box of any other shape. Points of shapes that end higher are left out.
 pub(super) fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
     let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
     let corners = colliding.flat_map(|(link_from_shape, shape)| match shape.as_ball() {
@@ -198,7 +199,7 @@ fn excluded(document: &Document, tree: &BodyTree) -> Result<BTreeSet<(usize, usi
     Ok(excluded)
 }
 
-/// Returns the links that fingers move, in the order of links, and the palm's position relative to the wrist.
+/// Returns the links that fingers move, in the order of links, and the palm's position in the wrist's frame.
 fn hand(joints: &[JointModel], side: Side, wrist: &SiteModel) -> HandLinks {
     let (thumb, fingers) = joints[HANDS[side]..HANDS[side] + HAND_JOINTS].split_at(THUMB_JOINTS);
     let links = |joints: &[JointModel]| {

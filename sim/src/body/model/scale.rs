@@ -1,9 +1,9 @@
 //! The size of a robot relative to the G1, for which the base controller's parameters were tuned.
 //!
-//! Consider two bodies that differ only in size, with lengths as l to 1 and masses as m to 1. They move
-//! alike if times are as sqrt(l) to 1, because gravity is the same for both. Accelerations are then
-//! equal, speeds as sqrt(l), forces as m and torques as m l to 1 (Froude's similarity). Where bodies
-//! differ in more than size, in soles and hips, each of these has its own ratio.
+//! Consider two bodies that differ only in size, with length ratio l and mass ratio m. They move alike if
+//! their time ratio is sqrt(l), because gravity is the same for both. The ratio of accelerations is then 1,
+//! of speeds sqrt(l), of forces m, and of torques m l (Froude's similarity). Where bodies differ in more than
+//! size, in soles and hips, each of these has its own ratio.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -17,26 +17,26 @@ pub struct BodyScale {
     length_ratio: f32,
     time_ratio: f32,
     mass_ratio: f32,
-    /// Height of the pelvis above that of a G1 of this size.
+    /// Excess height of the pelvis over that of a G1 scaled to this size.
     higher_m: f32,
     hip_width_ratio: f32,
     sole_length_ratio: f32,
     sole_width_ratio: f32,
-    /// Width of a sole beyond that of a G1 of this size.
+    /// Excess width of a sole over that of a G1 scaled to this size.
     wider_sole_m: f32,
     /// Vector from the ankle roll link to the centre of its sole.
     pub sole_in_foot_m: Vector,
-    /// Distances at which ankles can hold the whole weight, ahead and to the side.
+    /// Distances from the ankle at which its torque can hold the whole weight, ahead and to the side.
     pub ankle_reach_m: [f32; 2],
 }
 
-/// Share of the hips' width from which feet count as spread.
+/// Relative excess of the feet's distance over the hips' width above which feet count as spread.
 const SPREAD_SHARE: f32 = 0.1;
 /// Share of an ankle's effort available for holding the robot.
 const ANKLE_EFFORT_USED: f32 = 0.8;
 
 impl BodyScale {
-    /// The G1 itself. Its ankles are stronger than its soles are long.
+    /// The G1 itself. Its soles, not its ankles, limit its support.
     pub const G1: BodyScale = BodyScale {
         length_ratio: 1.0,
         time_ratio: 1.0,
@@ -58,7 +58,7 @@ impl BodyScale {
             let joint = &own.joints[LEGS.left + index];
             if joint.exists() { joint.effort_n_m } else { 0.0 }
         };
-        // A foot whose ankle does not roll stands on the middle of its sole.
+        // A foot whose ankle does not roll supports the robot at the middle of its sole.
         let rolls = own.joints[LEGS.left + LEG_JOINTS - 1].exists();
         let weight_n = own.mass_kg * GRAVITY_M_S2;
         BodyScale {
@@ -168,7 +168,7 @@ impl RobotModel {
     fn hip_width_m(&self) -> f32 {
         let [hip_m, foot_m] =
             [self.left_hip(), LEG_JOINTS - 1].map(|index| self.leg_joint_m(index, &[0.0; JOINTS]).y);
-        // Legs that spread below the hip stand as far apart as their feet.
+        // If the legs spread below the hip, the distance of the feet counts.
         if (foot_m - hip_m).abs() > SPREAD_SHARE * hip_m { foot_m } else { hip_m }
     }
 
@@ -197,7 +197,7 @@ mod tests {
     use super::*;
     use crate::body::posed::model;
 
-    /// A robot described like the G1 is moved like the G1, except that its ankles are stronger than it needs.
+    /// A robot described like the G1 has the scale of the G1, except for ankles stronger than the G1 needs.
     #[test]
     fn the_g1_has_the_scale_of_a_g1() {
         let own = BodyScale::between(model(), model());
@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(BodyScale { ankle_reach_m: BodyScale::G1.ankle_reach_m, ..own }, BodyScale::G1);
     }
 
-    /// A body four times as long and twice as heavy is slower by half.
+    /// A body four times as long and twice as heavy is slower by a factor of two.
     #[test]
     fn numbers_go_with_their_units() {
         let scale =
@@ -217,7 +217,7 @@ mod tests {
             (20.0, 24.0, 48.0)
         );
         assert_eq!((scale.inertia_kg_m2(1.0), scale.height_m(0.5)), (32.0, 2.1));
-        // A stiffness about an axis holds a weight at a length: both scale alike.
+        // A stiffness about an axis holds a weight at a distance: both scale alike.
         let weight_n_m = scale.force_n(1.0) * scale.length_m(1.0);
         assert_eq!(scale.moment_n_m(1.0), weight_n_m);
     }

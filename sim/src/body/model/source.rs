@@ -12,7 +12,7 @@ pub struct RobotSource {
     pub model: RobotModel,
     /// The MJCF, in which joints, wrists and camera have their published names.
     pub document: Document,
-    /// Hash that distinguishes robots of different files, including all files that these name.
+    /// Hash that distinguishes robots of different files, including the files that these name.
     pub fingerprint: u64,
 }
 

@@ -1,4 +1,4 @@
-//! The rest posture of a robot: its legs bent as much as a G1's, its soles flat under its centre of mass.
+//! The rest posture of a robot: legs bent as much as a G1's, with the soles flat under the centre of mass.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -6,7 +6,7 @@ use super::RobotModel;
 use crate::Side;
 use crate::body::layout::{JOINTS, LEG_JOINTS, LEGS};
 
-/// Joints of a leg that bend it.
+/// Leg joints that bend the leg.
 const HIP: usize = 0;
 const KNEE: usize = 3;
 const ANKLE: usize = 4;
@@ -59,7 +59,7 @@ impl RobotModel {
         }
     }
 
-    /// Returns the range of the left knee, bending backwards.
+    /// Returns the range of the left knee; bending backwards is positive.
     pub(super) fn knee_range_rad(&self) -> [f32; 2] {
         let knee = &self.joints[LEGS.left + KNEE];
         match self.bends_positively(Side::Left, KNEE) {
@@ -68,7 +68,7 @@ impl RobotModel {
         }
     }
 
-    /// Sets a joint of both legs so that it is turned about the lateral axis, which points left.
+    /// Sets a joint of both legs to an angle about the lateral axis, which points left.
     fn bend(&self, q_rad: &mut [f32; JOINTS], index: usize, angle_rad: f32) {
         for side in Side::BOTH {
             let positive = self.bends_positively(side, index);

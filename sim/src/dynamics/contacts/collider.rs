@@ -10,27 +10,27 @@ use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DMat3, DPose3, DVec3};
 
-/// Index of a collider of a world. Colliders are numbered in the order in which they were added.
+/// Index of a collider in a world. Colliders are numbered in the order in which they were added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ColliderId(pub(in crate::dynamics) u32);
 
-/// A convex shape that touches others.
+/// Convex shape that touches others.
 pub struct Collider {
     pub shape: SharedShape,
     /// The link that carries the collider; `None` for the world.
     pub on: Option<LinkId>,
-    /// Pose of the shape in the link's frame, or in the world's.
+    /// Pose of the shape in the frame of the link, or in the world frame.
     pub body_from_shape: DPose3,
     pub friction: Friction,
-    /// True if the collider extends without end along its x and y axes. Its shape is then only the part
-    /// of it near another collider.
+    /// True if the collider is unbounded along its x and y axes. Its shape is then only the part near another
+    /// collider.
     pub endless: bool,
     /// Tag by which the owner of the world recognises the collider.
     pub tag: u128,
     pub touches: Mask,
 }
 
-/// Collision mask, as bits: the kinds of a collider and the kinds that it touches. They are MJCF's `contype`
+/// Collision mask: bits for the kinds of a collider and the kinds that it touches. They are MJCF's `contype`
 /// and `conaffinity`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mask {
@@ -39,11 +39,11 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Default mask: such colliders touch each other.
+    /// Default mask. Colliders with it touch each other.
     pub const ALL: Mask = Mask { kinds: 1, touched: 1 };
 
-    /// Returns true if two colliders with these masks touch. It is enough if one of them touches a kind of
-    /// the other.
+    /// Returns true if two colliders with these masks touch. One of them touching a kind of the other is
+    /// enough.
     pub fn meets(self, other: Mask) -> bool {
         self.kinds & other.touched != 0 || other.kinds & self.touched != 0
     }
@@ -62,18 +62,18 @@ pub struct Surface {
     half_m: DVec3,
     half_length_m: f64,
     pub world_from_shape: DPose3,
-    /// Distance that the surface may close within the step. Two surfaces can touch if their distance is
-    /// below the sum of both.
+    /// Distance that the surface may close within the step. Two surfaces can touch if their distance is below
+    /// the sum of both reaches.
     pub reach_m: f64,
     /// Bounds in the world frame, grown by `reach_m`.
     pub bounds: Aabb,
-    /// True if it was placed since its body fell asleep.
+    /// True if the surface was placed since its body fell asleep.
     pub sleeps_there: bool,
 }
 
-/// Step of the places to which the shape of an endless collider is moved. The shape extends farther than one
-/// step beyond what it meets. Between two moves it stays still, so that contact points continue those of the
-/// step before.
+/// Grid spacing of the positions to which the shape of an endless collider is moved. The shape extends more
+/// than one spacing beyond what it meets. It stays in place between two moves, so that contact points
+/// continue those of the step before.
 const TILE_M: f64 = 32.0;
 /// Half extent of an endless collider's bounds.
 const ENDLESS_M: f64 = 1e6;
@@ -130,18 +130,18 @@ impl Surface {
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
     }
 
-    /// Returns true if the surface cannot move, or its body sleeps.
+    /// Returns true if the surface cannot move or its body sleeps.
     pub fn is_still(&self, trees: &Trees) -> bool {
         self.body.is_none_or(|link| trees.all[link.tree.index()].is_asleep())
     }
 
-    /// Returns the vector from the centre of this surface to that of another, in the frame of this one.
+    /// Returns the vector from the centre of this surface to that of the other, in the frame of this surface.
     pub fn towards(&self, other: &Surface) -> DVec3 {
         let middle_m = other.world_from_shape * other.middle_m;
         self.world_from_shape.inverse() * middle_m - self.middle_m
     }
 
-    /// Returns the pose of the shape that another surface may meet. The shape of an endless collider is
+    /// Returns the pose of the shape for contacts with another surface. The shape of an endless collider is
     /// moved next to that surface.
     pub fn beside(&self, other: &Surface) -> DPose3 {
         let other_m = other.world_from_shape * other.middle_m;

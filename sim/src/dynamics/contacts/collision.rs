@@ -1,9 +1,9 @@
-//! Collision detection: from the poses of colliders to candidates for contacts.
+//! Collision detection: from the poses of colliders to contact candidates.
 //!
-//! Parry carries the points of a pair along while the pair hardly turns. Of two faces that touch it
-//! would otherwise choose one in some steps and the other in others. So the points of the last step are
-//! part of the state. Round shapes may turn by far less. Their place of contact runs ahead of a point
-//! that is carried along, and a force that acts behind that place accelerates the shape.
+//! Parry moves the points of a pair along while the pair hardly turns. Otherwise it would choose one of two
+//! touching faces in some steps and the other face in others. The points of the last step are therefore part
+//! of the state. Round shapes may turn by far less. Their place of contact runs ahead of a point that is
+//! moved along, and a force behind that place accelerates the shape.
 
 use std::collections::BTreeMap;
 
@@ -26,10 +26,10 @@ use crate::dynamics::trees::spatial::rounded;
 use crate::dynamics::trees::{LinkId, TreeId, Trees};
 use crate::dynamics::{DPose3, DVec3};
 
-/// Angle by which a round shape turns before its points are searched anew, in rad. At the one degree
-/// that Parry allows, a bottle that whirled on its rim by two degrees gained energy until it fell over.
-/// A cylinder that rolled at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets other
-/// corners in every step and trembles.
+/// Angle (rad) by which a round shape turns before its points are searched anew. At Parry's one degree, a
+/// bottle that whirled on its rim by two degrees gained energy until it fell over, and a cylinder that rolled
+/// at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets other corners in every step and
+/// trembles.
 const ROUND_TURNS_RAD: f64 = 0.001;
 /// Maximum excess of a point's depth over the depth of the corners in a full contact of two faces.
 const FACE_M: f32 = 0.001;
@@ -42,7 +42,7 @@ pub struct Collision {
     pub candidates: Vec<Candidate>,
     /// Manifolds of the last step that have points, in the order of their colliders.
     pub manifolds: Vec<Manifold>,
-    /// Friction of pairs that have their own.
+    /// Friction of pairs with their own coefficients.
     pair_friction: BTreeMap<[ColliderId; 2], Friction>,
     /// Manifolds of this step; [`Collision::commit`] makes them those of the last step.
     found: Vec<Manifold>,
@@ -103,17 +103,17 @@ impl Collision {
         self.near.update(&self.surfaces, trees);
     }
 
-    /// Places the surfaces of sleeping bodies, too, in the next step: their state was set.
+    /// Places the surfaces of sleeping bodies, too, in the next step. Call it after their state was set.
     pub fn place_sleepers(&mut self) {
         self.surfaces.iter_mut().for_each(|surface| surface.sleeps_there = false);
     }
 
-    /// Returns the trees that carry two colliders; `None` for a collider that cannot move.
+    /// Returns the trees that carry two colliders. An entry is `None` if the collider cannot move.
     pub fn trees_of(&self, colliders: [ColliderId; 2]) -> [Option<TreeId>; 2] {
         colliders.map(|id| self.surfaces[id.index()].body.map(|body| body.tree))
     }
 
-    /// Returns pairs of different trees that have colliders whose bounds meet.
+    /// Returns pairs of different trees with colliders whose bounds meet.
     pub fn meeting_trees(&self) -> impl Iterator<Item = [TreeId; 2]> {
         self.near.pairs.iter().filter_map(|pair| {
             let [a, b] = pair.map(|id| &self.surfaces[id.index()]);
@@ -151,7 +151,7 @@ impl Collision {
         }
     }
 
-    /// Keeps the manifolds that the next step begins with.
+    /// Keeps the manifolds with which the next step begins.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.manifolds, &mut self.found);
     }
@@ -179,7 +179,7 @@ impl Collision {
     }
 }
 
-/// Work for the widest registers of the processor, with bit-identical results.
+/// Placement on the widest vector registers of the processor, with bit-identical results.
 struct Placing<'a> {
     collision: &'a mut Collision,
     trees: &'a Trees,
@@ -215,7 +215,7 @@ impl NearPair<'_> {
                 (manifold.local_n1, manifold.local_n2) = (before.local_n1, before.local_n2);
                 manifold.points.extend_from_slice(&before.points);
             }
-            // Starting direction of Parry's search.
+            // Initial direction of Parry's search.
             Some(before) => manifold.local_n1 = before.local_n1,
             None => manifold.local_n1 = first.towards(second).as_vec3(),
         }
@@ -229,22 +229,22 @@ impl NearPair<'_> {
         if let Some(overlap) = Overlap::of([a, b], &a_from_b) {
             overlap.mend(before, manifold);
         }
-        // Parry may find no direction between two shapes that only just touch. In the next step they are
-        // a little deeper, or apart.
+        // Parry may find no direction between two shapes that only just touch. In the next step they overlap
+        // a little more, or are apart.
         if !manifold.local_n1.is_normalized() {
             manifold.clear();
         }
     }
 
-    /// Returns true if the points of the last step may be carried along. Parry checks the other
-    /// conditions itself.
+    /// Returns true if the points of the last step may be moved along. Parry checks the other conditions
+    /// itself.
     fn is_continued(&self, before: &ContactManifold<(), ()>) -> bool {
         if !self.surfaces.iter().any(|surface| surface.is_round) {
             return true;
         }
         let [world_from_a, world_from_b] = self.world_from_shapes;
         let a_from_b = world_from_a.rotation.inverse() * world_from_b.rotation;
-        // The normals were opposite when the points were found, and each moves with its shape.
+        // The normals were opposite when the points were found, and each normal moves with its shape.
         let [of_a, of_b] = [before.local_n1, before.local_n2].map(Vector::as_dvec3);
         of_a.cross(a_from_b * of_b).length() < ROUND_TURNS_RAD
     }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::settings::Pass;
 use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 
-/// The friction coefficients that act: MJCF's `condim` 1, 3, 4 and 6.
+/// Directions in which friction acts: MJCF's `condim` 1, 3, 4 and 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Directions {
     None,
@@ -46,15 +46,15 @@ pub struct Friction {
     /// Moment about a tangent per normal force.
     pub roll_m: f64,
     pub priority: i32,
-    /// Remaining share of friction due to the state of the surface: 1 as manufactured, less if it is wet
-    /// or greasy.
+    /// Remaining share of friction for the condition of the surface: 1 as manufactured, less if it is wet or
+    /// greasy.
     pub left: f64,
 }
 
 impl Friction {
-    /// Combines the friction of two colliders. The values are those of the collider with the higher
-    /// priority, otherwise the larger of each. They are multiplied by the `left` of both surfaces.
-    /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
+    /// Combines the friction of two colliders. The values are those of the collider with the higher priority;
+    /// at equal priority, the larger of each. They are multiplied by the `left` of both surfaces. Source:
+    /// MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
         Friction::as_made(a, b).worn(a, b)
     }
@@ -88,8 +88,8 @@ impl Friction {
         }
     }
 
-    /// Returns the coefficients of the lanes of a contact (see the module's text); 0 for a lane that
-    /// does not act.
+    /// Returns the coefficients of the lanes of a contact (see the module's text). The coefficient is 0 for a
+    /// lane without effect.
     pub(in crate::dynamics) fn lanes(&self) -> [f64; 6] {
         let [slide, spin, roll] = match self.directions {
             Directions::None => [0.0; 3],
@@ -106,15 +106,15 @@ pub struct Contacts<const N: usize> {
     pub all: Vec<Contact<N>>,
 }
 
-/// Parameters of a contact beside its rows.
+/// Parameters of a contact besides its rows.
 pub struct Terms<const N: usize> {
-    /// Velocities added to the normal velocity, with correction of the position and without.
+    /// Velocities added to the normal velocity, with and without correction of the position.
     pub bias_m_s: [f64; 2],
     /// Compliance as a share of the effective mass.
     pub softness: f64,
     /// Lower bound of the normal's inverse mass.
     pub least_inverse_mass: f64,
-    /// mu_c; that of the normal is not used.
+    /// Coefficients mu_c; the normal's is not used.
     pub friction: [f64; N],
     /// Initial impulses.
     pub impulse: [f64; N],
@@ -148,7 +148,7 @@ impl<const N: usize> Contacts<N> {
         self.all.clear();
     }
 
-    /// Adds a contact. Its rows must have been pushed just before and have this inverse mass.
+    /// Adds a contact. Its rows must have been pushed just before, with this inverse mass.
     #[inline(always)]
     pub fn push(&mut self, inverse_mass: [[f64; N]; N], terms: Terms<N>) {
         let mu = terms.friction;
@@ -177,7 +177,7 @@ impl<const N: usize> Contacts<N> {
         });
     }
 
-    /// Adds the effect of the current impulses.
+    /// Adds the effect of the current impulses to `w`.
     pub fn push_impulses(&self, w: &mut Whitened) {
         for (group, contact) in self.all.iter().enumerate() {
             if contact.impulse != [0.0; N] {
@@ -186,8 +186,7 @@ impl<const N: usize> Contacts<N> {
         }
     }
 
-    /// Runs one Gauss-Seidel sweep, contact by contact. Each impulse changes by this share of its full
-    /// update.
+    /// Runs one Gauss-Seidel sweep, contact by contact. Each impulse changes by `share` of its full update.
     #[inline(always)]
     pub fn sweep(&mut self, pass: Pass, share: f64, w: &mut Whitened) {
         for (group, contact) in self.all.iter_mut().enumerate() {
@@ -211,7 +210,7 @@ impl<const N: usize> Contacts<N> {
 }
 
 impl<const N: usize> Contact<N> {
-    /// Returns the impulses that this contact alone would choose at the velocities `v` along its lanes.
+    /// Returns the impulses of this contact that solve it alone at the velocities `v` along its lanes.
     #[inline(always)]
     fn update(&self, pass: Pass, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
@@ -235,15 +234,15 @@ impl<const N: usize> Contact<N> {
         if N < 6 {
             return slid;
         }
-        // The step size suits the tangents. Rolls have less inertia and friction and need a second step
-        // to follow a ball that accelerates.
+        // The step size suits the tangents. Rolls have less inertia and friction, and need a second step to
+        // follow a ball that accelerates.
         for c in 1..N {
             v[c] += (1..N).map(|d| a[d][c] * (slid[d] - old[d])).sum::<f64>();
         }
         self.slide(&slid, &v, normal)
     }
 
-    /// Takes one step of projected gradients from the impulses `from`, at the velocities `v`.
+    /// Takes one step of projected gradient descent from the impulses `from`, at the velocities `v`.
     #[inline(always)]
     fn slide(&self, from: &[f64; N], v: &[f64; N], normal: f64) -> [f64; N] {
         let mut slid = [normal; N];
@@ -305,8 +304,8 @@ struct Symmetric2 {
 }
 
 impl Symmetric2 {
-    /// Inverts the block of two lanes that begins at `lane`; zero if there is no such block. Two
-    /// dependent lanes are each inverted alone and take half of the impulse.
+    /// Inverts the block of two lanes that begins at `lane`. Returns zero if there is no such block. Two
+    /// dependent lanes are each inverted alone, and each takes half of the impulse.
     fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
         if lane + 1 >= N {
             return Symmetric2::default();
@@ -323,23 +322,23 @@ impl Symmetric2 {
 
 /// Returns mass and firmness of a normal whose inverse mass `a` is below the least `e`. An impulse with
 ///   n = f (n - (v + b) / a),   f / a = 1 / (e + softness a)
-/// yields by the difference:  a n + v + b = -(e + (softness - 1) a) n. Without this, overlapping links would be
-/// torn apart where their joints hardly let them move in the direction of the overlap.
+/// yields by the difference:  a n + v + b = -(e + (softness - 1) a) n. Without this, overlapping links would
+/// be torn apart if their joints hardly let them move in the direction of the overlap.
 fn propped<const N: usize>(inverse_mass: f64, terms: &Terms<N>) -> (f64, [f64; 2]) {
     let least = terms.least_inverse_mass;
     let a = inverse_mass.max(SMALLEST_SHARE * least);
     (a.recip(), [terms.softness, 0.0].map(|softness| a / (least + softness * a)))
 }
 
-/// Share of the least inverse mass below which an inverse mass is rounding error.
+/// Share of the least inverse mass below which an inverse mass counts as rounding error.
 const SMALLEST_SHARE: f64 = 1e-9;
 
-/// Inverts an inverse mass; 0 if no body can move.
+/// Inverts an inverse mass. Returns 0 if no body can move.
 fn inverse(inverse_mass: f64) -> f64 {
     if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }
 
-/// Threshold on the determinant, as a share, below which two directions count as one.
+/// Threshold on the relative determinant, below which two directions count as one.
 const DEPENDENT: f64 = 1e-12;
 
 /// Returns the larger eigenvalue of the 2 x 2 block that begins at `lane`.

@@ -28,9 +28,9 @@ pub struct ContactPoint {
     pub impulse_n_s: DVec3,
     /// Part of the impulse along the normal.
     pub normal_impulse_n_s: f64,
-    /// Number of the point among those of the same pair.
+    /// Index of the point among those of the same pair.
     pub(in crate::dynamics) number: u32,
-    /// The point on each collider, in the collider's own frame.
+    /// The point on each collider, in that collider's frame.
     pub(in crate::dynamics) local_m: [DVec3; 2],
     /// Impulses with which the next step begins.
     pub(in crate::dynamics) memory: Impulses,
@@ -45,13 +45,13 @@ pub struct Impulses {
     pub roll: DVec3,
 }
 
-/// Returns the colliders of a point, by which points are ordered.
+/// Returns the two colliders of a point, by which points are sorted.
 pub fn colliders_of(touch: &ContactPoint) -> [ColliderId; 2] {
     touch.colliders
 }
 
 impl Impulses {
-    /// Returns the impulses as lanes of a contact with these directions (normal, two tangents).
+    /// Returns the impulses as lanes of a contact with these directions: normal and two tangents.
     pub fn lanes(&self, [_, t1, t2]: [DVec3; 3]) -> [f64; 6] {
         let (tangent, roll) = (self.tangent, self.roll);
         [self.normal, tangent.dot(t1), tangent.dot(t2), self.spin, roll.dot(t1), roll.dot(t2)]
@@ -63,7 +63,7 @@ impl Impulses {
     }
 }
 
-/// A contact point in the course of a step.
+/// Contact point during a step.
 #[derive(Clone, Copy)]
 pub struct Candidate {
     pub touch: ContactPoint,
@@ -73,8 +73,8 @@ pub struct Candidate {
     pub directions: [DVec3; 3],
 }
 
-/// Returns the impulses of the last step's point that this one continues: of the same pair, the nearest
-/// one on either surface. Returns `None` if no point is within `match_m`.
+/// Returns the impulses of the point of the last step that this one continues: the nearest point of the same
+/// pair, on either surface. Returns `None` if no point is within `match_m`.
 pub fn continued(touch: &ContactPoint, before: &[ContactPoint], match_m: f64) -> Option<Impulses> {
     let away = |old: &ContactPoint| {
         let on = |side: usize| old.local_m[side].distance_squared(touch.local_m[side]);

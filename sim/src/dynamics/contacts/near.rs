@@ -13,11 +13,11 @@ use crate::dynamics::trees::{LinkId, Trees};
 #[derive(Default)]
 pub struct NearPairs {
     /// Pairs in order, the smaller collider first. They include all pairs that could touch in this step, and
-    /// some that could not. The latter depend on the past, so no result may depend on them.
+    /// some that could not. The latter depend on earlier steps, so no result may depend on them.
     pub pairs: Vec<[ColliderId; 2]>,
     apart: Apart,
     broad_phase: BroadPhaseBvh,
-    /// Colliders as the broad phase reads them; it has no bodies to read.
+    /// Colliders as the broad phase reads them, without bodies.
     colliders: ColliderSet,
     handles: Vec<ColliderHandle>,
     bodies: RigidBodySet,
@@ -32,13 +32,13 @@ struct Apart {
     links: BTreeSet<(LinkId, LinkId)>,
     /// Pairs of colliders, smaller first.
     colliders: BTreeSet<[ColliderId; 2]>,
-    /// Pairs of colliders, smaller first, that touch all the same.
+    /// Pairs of colliders, smaller first, that may touch nevertheless.
     together: BTreeSet<[ColliderId; 2]>,
 }
 
 impl NearPairs {
     pub fn add(&mut self, surface: &Surface) -> ColliderId {
-        // For Rapier all colliders are fixed. It makes no pair of two that no tree moves.
+        // For Rapier all colliders are fixed. It forms no pair of two colliders that no tree moves.
         let kinds = match surface.body {
             Some(_) => ActiveCollisionTypes::FIXED_FIXED,
             None => ActiveCollisionTypes::empty(),
@@ -100,7 +100,8 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
 }
 
 /// Returns true if two colliders may touch. As in MuJoCo, bodies of one tree that a joint connects do not
-/// collide. Neither do two that are kept apart or whose masks exclude each other, unless they are let touch.
+/// collide. Neither do colliders that are kept apart or whose masks exclude each other, unless the pair is
+/// exempted.
 fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: &Apart) -> bool {
     if apart.together.contains(&pair) {
         return true;
@@ -109,7 +110,7 @@ fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: 
     if !a.collider.touches.meets(b.collider.touches) || apart.colliders.contains(&pair) {
         return false;
     }
-    // Fixed links can be kept apart from others, too.
+    // Fixed links can also be kept apart from others.
     if let (Some(a), Some(b)) = (a.collider.on, b.collider.on)
         && apart.links.contains(&(a.min(b), a.max(b)))
     {

@@ -6,8 +6,8 @@
 //! floor. A foot was reported 2.7 m deep in a floor that it touched, along a normal of neither shape.
 //! Along a unit vector n, from a to b, two shapes overlap by
 //!   o(n) = max over a of n . x - min over b of n . x,
-//! and the depth is the least of that over all n. So a normal is wrong if its o clearly exceeds that of
-//! a face or of the last step's normal.
+//! and the depth is the minimum of that over all n. So a normal is wrong if its o clearly exceeds the o of a
+//! face's normal or of the last step's normal.
 
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::{ContactManifold, TrackedContact};
@@ -15,8 +15,8 @@ use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeature
 
 /// Overlap along the normal below which the result is always close to the depth.
 const DEEP_M: f32 = 0.005;
-/// Number of outermost points that are remembered. A normal is left out if its overlap exceeds the least
-/// overlap at these points by `CERTAINLY_M`, which is far above rounding.
+/// Number of outermost points that are kept. A normal is skipped if its overlap at these points exceeds the
+/// least overlap by `CERTAINLY_M`, which is far above rounding.
 const REMEMBERED: usize = 16;
 const CERTAINLY_M: f32 = 0.0001;
 /// Minimum difference in overlap at which another normal replaces the present one.
@@ -32,8 +32,8 @@ pub struct Overlap<'a> {
 }
 
 impl<'a> Overlap<'a> {
-    /// Returns the overlap of shapes for which Parry searches. Returns `None` for balls, two boxes and
-    /// two capsules, whose depth Parry computes by formula.
+    /// Returns the overlap of shapes for which Parry searches. Returns `None` for balls, two boxes and two
+    /// capsules, whose depth Parry computes in closed form.
     pub fn of(shapes: [&'a dyn Shape; 2], a_from_b: &'a Pose) -> Option<Overlap<'a>> {
         let [(a, radius_a_m), (b, radius_b_m)] =
             [shapes[0].as_polygonal_feature_map()?, shapes[1].as_polygonal_feature_map()?];
@@ -49,8 +49,8 @@ impl<'a> Overlap<'a> {
         })
     }
 
-    /// Replaces points along a normal that cannot be right. It also restores points that Parry has lost
-    /// although those of the last step, in `before`, were deep.
+    /// Replaces points along a normal that cannot be right. Also restores points that Parry has lost although
+    /// the points of the last step, in `before`, were deep.
     pub fn mend(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
         let overlaps = |manifold: &ContactManifold<(), ()>, by_m: f32| {
             manifold.points.iter().any(|point| point.dist < -by_m)
@@ -78,9 +78,9 @@ impl<'a> Overlap<'a> {
         of_a.chain(of_b).chain(last)
     }
 
-    /// Returns the least overlap along the normals; of equal ones, the first. The search for outermost points
-    /// is slow for hulls of many corners. A normal is skipped if points that were found for other normals
-    /// already overlap by more.
+    /// Returns the least overlap along the normals; among equal overlaps, the first. The search for outermost
+    /// points is slow for hulls with many corners. A normal is skipped if points that were found for other
+    /// normals already overlap by more.
     fn least(&self, normals: impl Iterator<Item = Vector>) -> Option<Along> {
         let mut known: [[Vector; 2]; REMEMBERED] = Default::default();
         let mut found = 0;
@@ -156,7 +156,8 @@ struct Along {
     depth_m: f32,
 }
 
-/// Returns the outward normals of a shape's faces, in its frame; for a round shape those of its ends.
+/// Returns the outward normals of a shape's faces, in the shape's frame. For a round shape, they are those of
+/// its ends.
 fn face_normals(shape: &dyn Shape) -> impl Iterator<Item = Vector> {
     let axes: &[Vector] = match shape.as_typed_shape() {
         TypedShape::Cuboid(_) | TypedShape::RoundCuboid(_) => &[Vector::X, Vector::Y, Vector::Z],

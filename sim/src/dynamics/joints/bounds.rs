@@ -1,5 +1,5 @@
-//! Rows of single joints: drives at their limits, dry friction and limits of position, all along one
-//! degree of freedom.
+//! Rows of single joints, each along one degree of freedom: drives at their limits, dry friction and limits
+//! of position.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -13,11 +13,11 @@ use crate::dynamics::trees::tree::Tree;
 
 #[derive(Default)]
 pub struct JointRows {
-    /// All rows in the order of links, those of similar trees side by side.
+    /// All rows in the order of the links, with the rows of trees of one layout side by side.
     all: Vec<JointRow>,
-    /// Range of rows of each lot of similar trees.
+    /// Range of the rows of each group of trees of one layout.
     of_alike: Vec<Range<usize>>,
-    /// Columns within a tree and entries of Y there, for all rows.
+    /// Columns within a tree, and the entries of Y in them, for all rows.
     column: Vec<u16>,
     y: Vec<Abreast>,
     drives: Vec<BoundedDrive>,
@@ -25,14 +25,14 @@ pub struct JointRows {
     w: Vec<Abreast>,
 }
 
-/// The rows of one joint in each tree of a lot. For a tree that has none, masses, friction and impulses
-/// are zero.
+/// Rows of one joint, with a lane for each tree of a group. For a tree without such a row, masses, friction
+/// and impulses are zero.
 struct JointRow {
     link: usize,
     exists: [bool; ABREAST],
-    /// Range of this row's columns and Y among those of all rows.
+    /// Range of this row's columns among those of all rows; the same for Y.
     places: Range<usize>,
-    /// Y . Y, and its inverse.
+    /// Inverse mass Y . Y, and its inverse.
     inverse_mass: Abreast,
     mass: Abreast,
     /// Range of this joint's drives among all bounded drives.
@@ -41,7 +41,7 @@ struct JointRow {
     range: JointRange,
 }
 
-/// A drive near a limit of its effort or speed, which the mass matrix leaves out.
+/// Drive near its limit of effort or speed, which the mass matrix does not contain.
 struct BoundedDrive {
     lane: usize,
     law: DriveLaw,
@@ -53,8 +53,8 @@ struct DryFriction {
     impulse: Abreast,
 }
 
-/// Both ends of a joint's range: the allowed velocities towards them, by [`Pass`], and the impulses. If
-/// a joint has no such end, no velocity reaches it.
+/// Both ends of a joint's range: the allowed velocities towards them, by [`Pass`], and the impulses. An end
+/// that does not exist never limits the velocity.
 struct JointRange {
     exists: [bool; ABREAST],
     down: [Abreast; 2],
@@ -65,14 +65,14 @@ struct JointRange {
     pushes: bool,
 }
 
-/// Extra speed (rad/s or m/s) for deciding on a row for the range. A joint without other rows gets one
-/// at first only if it could reach an end when moving this much faster.
+/// Extra speed (rad/s or m/s) in the test for a row. A joint without other rows gets one for its range at
+/// first only if it could reach an end when moving faster by this amount.
 const NEAR_RANGE: f64 = 10.0;
 /// Overshoot (rad or m) beyond the range at which a joint without a row gets one, and the step is repeated.
 const MAX_OVERSHOOT: f64 = 0.01;
 
 impl Tree {
-    /// Returns true if a joint has a row in any case.
+    /// Returns true if a joint has a row regardless of its range.
     fn is_held(&self, link: usize) -> bool {
         self.bounded[link] || self.links[link].joint.axis().is_some_and(|axis| axis.friction_loss > 0.0)
     }
@@ -87,8 +87,8 @@ impl Tree {
         self.is_held(link) || self.overrun[link] || q - reach < low || q + reach > high
     }
 
-    /// Marks the joints that were not near an end but leave their ranges when they move by the
-    /// velocities `v`. Returns true if there were any.
+    /// Marks the joints that were not near an end but leave their ranges at the velocities `v`. Returns true
+    /// if there are any.
     pub(in crate::dynamics) fn hold_more(&mut self, dt_s: f64, v: &[f64]) -> bool {
         let mut more = false;
         for i in 0..self.links.len() {
@@ -244,9 +244,9 @@ impl JointRows {
     }
 }
 
-/// Returns the allowed velocities towards an end of the range at a distance, correcting and relaxing.
-/// Before the end, the joint may reach it within the step. Beyond the end, the velocity must lead back,
-/// or be zero while relaxing.
+/// Returns the allowed velocities towards an end of the range that is `distance` away, for correcting and
+/// relaxing. Before the end, the joint may reach it within the step. Beyond the end, the velocity must lead
+/// back, or be zero while relaxing.
 #[inline(always)]
 fn approach(distance: Abreast, settings: &Settings) -> [Abreast; 2] {
     let open = distance.0.map(|distance| distance.max(0.0) / settings.dt_s);
@@ -263,7 +263,7 @@ impl JointRow {
         AbreastRow { column: &column[self.places.clone()], y: &y[self.places.clone()] }
     }
 
-    /// Applies the drives to the velocities. Returns the greatest change by a motor that is turned too fast.
+    /// Applies the drives to the velocities. Returns the largest change by a motor that is turned too fast.
     #[inline(never)]
     fn drive(&self, drives: &mut [BoundedDrive], v: &mut Abreast) -> f64 {
         let mut greatest = 0.0f64;
@@ -311,7 +311,7 @@ impl DryFriction {
 }
 
 impl JointRange {
-    /// Returns the allowed velocities towards both ends.
+    /// Returns the allowed velocities towards each end.
     #[inline(always)]
     fn allowed(&self, pass: Pass) -> [Abreast; 2] {
         let at = match pass {
@@ -321,7 +321,7 @@ impl JointRange {
         [self.down[at], self.up[at]]
     }
 
-    /// Returns true if neither end has an effect. Most joints are far from both, so this is a fast check.
+    /// Returns true if neither end has an effect. Most joints are far from both ends, so this check is fast.
     #[inline(always)]
     fn rests(&self, pass: Pass, v: Abreast) -> bool {
         let [down, up] = self.allowed(pass);

@@ -23,7 +23,7 @@ pub enum Equality {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EqualityId(pub(in crate::dynamics) usize);
 
-/// The part of an equality that outlasts a step.
+/// State of an equality that outlasts a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EqualityState {
     pub active: bool,
@@ -39,21 +39,21 @@ pub struct Equalities {
     blocks: Vec<Block>,
 }
 
-/// Three rows that are solved together; a coupling uses only the first.
+/// Three rows that are solved together; a coupling has only the first.
 struct Block {
     equality: usize,
     /// Index of this block, 0 or 1, within its equality.
     part: usize,
-    /// Velocity that corrects the error.
+    /// Velocity along the rows that corrects the error.
     correction: DVec3,
     mass: DMat3,
     impulse: DVec3,
-    /// Impulse after the correcting sweeps.
+    /// Impulse after the correcting sweeps, with which the next step begins.
     remembered: DVec3,
 }
 
-/// Share of its trace added to the diagonal of a block's inverse mass. It keeps rows solvable if no body can
-/// move along them.
+/// Regularisation of the diagonal of a block's inverse mass, as a share of its trace. It keeps rows solvable
+/// if no body can move along them.
 const REGULARISATION: f64 = 1e-9;
 
 impl Equalities {

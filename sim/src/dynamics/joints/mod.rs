@@ -5,11 +5,11 @@
 //!   tau = kp (target - q - dt v') - kd v' + feedforward.
 //! Inserted into M (v' - v) = dt (tau - bias), the terms with v' move to the left:
 //!   (M + dt kd + dt^2 kp) v' = M v + dt (kp (target - q) + feedforward - bias),
-//! which is exact and costs nothing. Springs and dampers of the joint itself enter the same way. This
-//! form has no limit, though. A drive near its limit is left out of the mass matrix and becomes a
-//! bounded row of the solver (`bounds`). The set of such drives is guessed from the last step, and the
-//! step is repeated if the guess was wrong. So no effort, implicit parts included, exceeds its limit.
-//! The only exception is a motor that something turns too fast.
+//! which is exact and has no extra cost. Springs and dampers of the joint itself enter in the same way. This
+//! form cannot limit the effort, though. A drive near its limit is therefore left out of the mass matrix, and
+//! becomes a bounded row of the solver (`bounds`). The set of such drives is guessed from the last step, and
+//! the step is repeated if the guess was wrong. So no effort, implicit parts included, exceeds its limit. The
+//! only exception is a motor that something else turns too fast.
 
 pub mod bounds;
 pub mod equality;
@@ -19,23 +19,23 @@ use super::trees::tree::Tree;
 
 /// Share of its limit that a drive must have exerted in the last step to be a row in the next.
 const NEAR_LIMIT: f64 = 0.8;
-/// Share of its speed limit above which a drive pushes less.
+/// Share of its speed limit above which a drive's maximum effort falls.
 const SLACKENS: f64 = 0.8;
 /// Relative tolerance to which efforts respect their limits.
 const TOLERANCE: f64 = 1e-9;
 
 impl DriveLaw {
-    /// Returns the slope of the effort limit over speed for a fast drive.
+    /// Returns the slope of a drive's maximum effort over speed, near its speed limit.
     fn slope(&self) -> f64 {
         self.most / (self.speed_limit * (1.0 - SLACKENS))
     }
 
-    /// Returns true if a drive still has its full effort at the velocity `v`.
+    /// Returns true if a drive has its full effort at the velocity `v`.
     fn is_strong(&self, v: f64) -> bool {
         v.abs() <= SLACKENS * self.speed_limit
     }
 
-    /// Returns the smallest and largest impulse at the velocity `v` at the end of the step.
+    /// Returns the minimum and maximum impulse at the velocity `v` of the end of the step.
     fn bounds(&self, v: f64) -> [f64; 2] {
         if self.is_strong(v) {
             return [-self.most, self.most];
@@ -94,8 +94,8 @@ impl Tree {
         }
     }
 
-    /// Marks the drives that exceed their limits at the velocities `v` of the end of the step. Returns
-    /// true if there were any.
+    /// Marks the drives that exceed their limits at the velocities `v` of the end of the step. Returns true
+    /// if there are any.
     pub(in crate::dynamics) fn bound_more(&mut self, v: &[f64]) -> bool {
         let mut more = false;
         for i in 0..self.links.len() {
@@ -133,7 +133,7 @@ impl Tree {
         }
     }
 
-    /// Stores the efforts of the drives that are not rows, at the velocities `v` of the end of the step.
+    /// Stores the efforts of the drives without rows, at the velocities `v` of the end of the step.
     pub(in crate::dynamics) fn keep_efforts(&mut self, dt_s: f64, v: &[f64]) {
         for i in 0..self.links.len() {
             if self.links[i].joint.axis().is_some() && !self.bounded[i] {

@@ -1,20 +1,20 @@
-//! Contact islands, called heaps here: trees that touch each other, directly or through others. Contacts
-//! of one heap have no effect on another.
+//! Contact islands, called heaps here: trees that touch each other, directly or through others. Contacts of
+//! one heap do not affect another heap.
 
 use crate::dynamics::contacts::Candidate;
 
 #[derive(Default)]
 pub struct Heaps {
-    /// Heap of every tree.
+    /// Heap of each tree.
     of_tree: Vec<usize>,
     /// Number of contacts of the same heap before each candidate, and the candidate.
     turns: Vec<(usize, usize)>,
-    /// Running number of contacts, by heap.
+    /// Running count of contacts, by heap.
     counts: Vec<usize>,
 }
 
 impl Heaps {
-    /// Finds the heaps of `trees` trees, by the points at which they may touch.
+    /// Finds the heaps of `trees` trees from the points at which they may touch.
     pub fn find(&mut self, trees: usize, candidates: &[Candidate]) {
         self.of_tree.clear();
         self.of_tree.extend(0..trees);
@@ -30,13 +30,13 @@ impl Heaps {
         self.of_tree[tree]
     }
 
-    /// Returns the heap of a contact. At least one of the two touching bodies belongs to a tree.
+    /// Returns the heap of a contact. At least one of its two bodies belongs to a tree.
     pub fn of_contact(&self, candidate: &Candidate) -> usize {
         candidate.bodies.iter().flatten().next().map_or(0, |body| self.of_tree[body.tree.index()])
     }
 
-    /// Returns the candidates with the heaps taking turns; those of one heap stay in order. A processor
-    /// can then work on independent contacts at the same time.
+    /// Returns the candidates with heaps taking turns; candidates of one heap stay in order. A processor can
+    /// then work on independent contacts at the same time.
     pub fn in_turn(&mut self, candidates: &[Candidate]) -> impl Iterator<Item = usize> {
         self.counts.clear();
         self.counts.resize(self.of_tree.len(), 0);

@@ -19,8 +19,8 @@ use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::{LinkId, Trees};
 
-/// Velocity (rad/s or m/s) removed in the last sweep above which more sweeps follow, and their maximum
-/// number. Only the ends of ranges and motors that are turned too fast count. An example is a heavy body that
+/// Velocity (rad/s or m/s) removed in the last sweep above which more sweeps follow, and the maximum number
+/// of these. Only ends of ranges and motors that are turned too fast count, for example when a heavy body
 /// presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
@@ -34,22 +34,24 @@ const DAMPED_SHARE: f64 = 0.5;
 const DEEP_M: f64 = 0.01;
 /// Penetration depth above which a contact is rigid.
 const RIGID_M: f64 = 0.02;
-/// Lower bound of the inverse mass of a contact's normal, as a share of the links' own inverse masses.
+/// Lower bound of the inverse mass along a contact's normal, as a share of the inverse masses of the two
+/// links.
 const MIN_SHARE: f64 = 0.01;
-/// Energy (J) removed by the relaxing sweeps above which more energy may be left.
+/// Energy (J) removed by the relaxing sweeps above which [`Solver::take_only`] scales the contact impulses.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
 pub struct Solver {
     /// Whitened velocities of all trees.
     pub w: Whitened,
-    /// Whitened velocities before the step, and their change by contacts; used only by [`Solver::take_only`].
+    /// Whitened velocities before the step, and their change by contacts. Only [`Solver::take_only`] uses
+    /// them.
     before: Vec<f64>,
     change: Whitened,
     joints: JointRows,
     pub equalities: Equalities,
     heaps: Heaps,
-    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order in which
+    /// Contacts that slide and spin, and contacts that also resist rolling. Both are in the order in which
     /// heaps take turns.
     plain: Contacts<4>,
     rolling: Contacts<6>,
@@ -63,7 +65,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Builds all rows. The trees must be factorised, and `w` must hold the unconstrained velocities.
+    /// Builds all rows. The trees must be factorised, and `w` must contain the unconstrained velocities.
     pub fn prepare(&mut self, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
         self.w.clear_margins();
         self.begin(candidates, settings);
@@ -141,15 +143,14 @@ impl Solver {
         }
     }
 
-    /// Keeps the state that the next step begins with. Nothing of the last step changes before this call.
+    /// Keeps the state with which the next step begins. State of the last step is unchanged before this call.
     pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
         self.joints.commit(trees, dt_s);
         self.equalities.commit();
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
-    /// Runs `sweeps` sweeps, and more if ends of ranges or motors that are turned too fast have not
-    /// settled by then.
+    /// Runs `sweeps` sweeps, and more if ends of ranges or motors that are turned too fast have not settled.
     fn settle(&mut self, trees: &Trees, pass: Pass, sweeps: usize) {
         Arch::new().dispatch(Settling { solver: self, trees, pass, sweeps });
     }
@@ -170,8 +171,9 @@ impl Solver {
     /// leave part of the speed that separates penetrating bodies. The impulses P of all contacts of a
     /// heap have then done work, and a share s of them does
     ///   W(s) = s P . (v + v' - (1 - s) M^-1 P) / 2,   v and v' the velocities before and after the step.
-    /// The share that stays is the one that does no work. It preserves all momentum and all friction cones.
-    /// Remaining approach velocities, and joints that move on into their stops, are stopped in the next step.
+    /// The share with which the contacts do no work is used. It preserves all momentum and all friction
+    /// cones. Remaining approach velocities, and joints that move on into their stops, are stopped in the
+    /// next step.
     fn take_only(&mut self, trees: &Trees, candidates: &[Candidate]) {
         self.before.resize(self.w.len(), 0.0);
         for (tree, offset) in trees.all.iter().zip(&trees.offset) {
@@ -214,7 +216,7 @@ impl Solver {
         }
     }
 
-    /// Returns the impulses of the contact that a candidate became.
+    /// Returns the impulses of the contact made from a candidate.
     fn impulse(&self, index: usize, candidate: &Candidate) -> [f64; 6] {
         let mut lanes = [0.0; 6];
         match candidate.friction.directions {
@@ -226,8 +228,8 @@ impl Solver {
         lanes
     }
 
-    /// Runs one sweep in which contacts change by this share of their full update. Returns the greatest
-    /// velocity (rad/s or m/s) that joints removed, see [`JointRows::sweep`].
+    /// Runs one sweep, in which contacts change by `share` of their full update. Returns the largest velocity
+    /// (rad/s or m/s) that joints removed, see [`JointRows::sweep`].
     #[inline(always)]
     fn sweep(&mut self, trees: &Trees, pass: Pass, share: f64) -> f64 {
         let pushed = self.joints.sweep(pass, trees, &mut self.w);
@@ -238,7 +240,7 @@ impl Solver {
     }
 }
 
-/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
+/// Sweeps on the widest vector registers of the processor, bit-identical to scalar operations.
 struct Settling<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,
@@ -255,7 +257,7 @@ impl WithSimd for Settling<'_> {
     }
 }
 
-/// Construction of all rows of contacts on the widest vectors, like [`Settling`].
+/// Construction of all rows of contacts on the widest vector registers, like [`Settling`].
 struct Gathering<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,
@@ -275,7 +277,7 @@ impl WithSimd for Gathering<'_> {
 /// Work of the contacts of a heap in a step.
 #[derive(Clone, Copy, Default)]
 struct HeapWork {
-    /// Twice the work of their impulses, and twice the work of the same impulses on bodies at rest.
+    /// Twice the work of the impulses, and twice the work of the same impulses on bodies at rest.
     twice_j: f64,
     own_j: f64,
 }
@@ -295,16 +297,16 @@ fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
-/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses a
-/// finger that is stretched against its stop into an obstacle, with 300 times the finger's weight. Without
-/// this, the finger would stay 2 cm deep.
+/// Returns the remaining share of a contact's softness: 1 up to a depth of 1 cm, 0 at 2 cm. Without it, a
+/// finger stretched against its stop would stay 2 cm deep in an obstacle, if an arm presses it with 300 times
+/// the finger's weight.
 fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Returns the least inverse mass (1/kg) along a contact's normal: [`MIN_SHARE`] of the two links' own
-/// inverse masses. The inverse mass is lower only where joints let neither link move. The result is 0 between
-/// two trees, or a tree and the world, if a tree is free: the inverse mass is then at least that of the
+/// Returns the least inverse mass (1/kg) along a contact's normal: [`MIN_SHARE`] of the inverse masses of the
+/// two links. The actual inverse mass is lower only if joints let neither link move. Returns 0 between two
+/// trees, or a tree and the world, if a tree is free: the actual inverse mass is then at least that of the
 /// whole tree.
 fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
     let held = |body: LinkId| !matches!(trees.all[body.tree.index()].links[0].joint, Joint::Free);
@@ -351,8 +353,8 @@ fn push<S: Simd, const N: usize>(
     let correction_m_s = depth_m * softness.correction_per_s(settings.dt_s);
     let mut friction = candidate.friction.lanes();
     if gap_m > 0.0 {
-        // Only a loaded contact resists rolling. Otherwise a ball in a bowl would lose part of its spin
-        // to every face that it is about to reach.
+        // Only a loaded contact resists rolling. Otherwise a ball in a bowl would lose part of its spin to
+        // every face that it is about to touch.
         friction[4..].fill(0.0);
     }
     let terms = Terms {

@@ -10,8 +10,8 @@ use crate::dynamics::trees::tree::Tree;
 use crate::dynamics::{DVec3, Dynamics};
 
 impl Dynamics {
-    /// Detects collisions, finds the acting forces, and moves all trees by one step. It allocates
-    /// nothing once its buffers have grown.
+    /// Detects collisions, computes the forces, and advances all trees by one step. It allocates nothing once
+    /// its buffers have grown.
     ///
     /// # Errors
     ///
@@ -68,7 +68,7 @@ impl Dynamics {
         more
     }
 
-    /// Checks that velocities are finite. Positions are as finite as the velocities that move them.
+    /// Checks that velocities are finite. Finite velocities keep positions finite.
     fn check(&self) -> Result<(), Diverged> {
         for (tree, offset) in self.trees.all.iter().zip(&self.trees.offset) {
             for (dof, link) in tree.layout.link_of.iter().enumerate() {
@@ -87,7 +87,8 @@ impl Dynamics {
     }
 }
 
-/// The step produced a number that is not finite or soon will not be. The state is that before the step.
+/// Error of a step that produced a number which is not finite or soon would not be. The state is that before
+/// the step.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which \
@@ -100,10 +101,10 @@ pub struct Diverged {
     pub speed: f64,
 }
 
-/// Maximum velocity, m/s or rad/s. No real motion comes near; beyond it, Rapier's f32 would soon overflow.
+/// Maximum velocity, m/s or rad/s. Real motion is far slower; beyond it, Rapier's f32 would soon overflow.
 const FASTEST: f64 = 1e6;
 
-/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
+/// Whitening on the widest vector registers of the processor, bit-identical to scalar operations.
 struct Whitening<'a> {
     trees: &'a mut Trees,
     w: &'a mut [f64],
@@ -123,7 +124,7 @@ impl WithSimd for Whitening<'_> {
     }
 }
 
-/// Work on the widest vectors, like [`Whitening`].
+/// Unwhitening on the widest vector registers, like [`Whitening`].
 struct Unwhitening<'a> {
     trees: &'a mut Trees,
     w: &'a [f64],

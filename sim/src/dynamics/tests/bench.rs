@@ -32,7 +32,7 @@ impl Bench {
         self.dynamics.add_tree(tree)
     }
 
-    /// Adds a fixed slab with its upper side at z = 0.
+    /// Adds a fixed slab whose upper side is at z = 0.
     pub fn add_slab(&mut self, half_width_m: f32, friction: Friction) {
         let shape = SharedShape::cuboid(half_width_m, half_width_m, 0.1);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -0.1));
@@ -47,7 +47,7 @@ impl Bench {
         });
     }
 
-    /// Adds an endless floor at z = 0. A part of 80 m exists at a time.
+    /// Adds an endless floor at z = 0. Its shape is a part of 80 m at any time.
     pub fn add_endless_floor(&mut self, friction: Friction) {
         let shape = SharedShape::cuboid(40.0, 40.0, 1.0);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -1.0));
@@ -149,7 +149,7 @@ pub fn link(parent: Option<usize>, at_m: DVec3, joint: Joint, mass: Mass) -> Lin
     Link { name: "link".into(), parent, parent_from_link: DPose3::from_translation(at_m), joint, mass }
 }
 
-/// Builds a tree of one joint on the world.
+/// Builds a tree of one joint, attached to the world.
 pub fn jointed(joint: Joint, mass: Mass) -> Tree {
     Tree::new("jointed", vec![link(None, DVec3::ZERO, joint, mass)]).expect("one moving link")
 }

@@ -21,15 +21,15 @@ fn dynamics_stack_of_eight_boxes_stands() {
     let settled = place(&bench);
     bench.run_s(8.0);
     for (level, after) in place(&bench).into_iter().enumerate() {
-        // Contacts are soft: those at the bottom give by a millimetre under the weight of the others.
+        // Contacts are soft: those at the bottom yield by a millimetre under the weight of the others.
         let (sunk_m, crept_m) = (after - built[level], after - settled[level]);
         assert!(sunk_m.length() < 0.0015 * (level + 1) as f64, "box {level} moved by {sunk_m}");
         assert!(crept_m.length() < 3e-4, "box {level} crept by {crept_m}");
     }
 }
 
-/// Contacts are soft in proportion to the lighter side's mass. A hundred times its weight presses them
-/// in by some millimetres, at once and no further.
+/// Contacts are soft in proportion to the mass of the lighter body. A hundred times its weight presses the
+/// light box in by some millimetres, at once and no further.
 #[test]
 fn dynamics_light_box_bears_a_hundred_times_its_weight() {
     let half_m = DVec3::splat(0.05);
@@ -94,7 +94,7 @@ fn dynamics_pile_comes_to_rest() {
     }
 }
 
-/// A ball at 5 m/s neither bounces nor passes.
+/// A ball at 5 m/s neither bounces off the floor nor passes through it.
 #[test]
 fn dynamics_fast_ball_stops_at_the_floor() {
     let mut bench = Bench::with_floor(DOWN, sliding(0.5));

@@ -32,14 +32,14 @@ fn dynamics_drive_saturates() {
     assert!((bench.dynamics.tree(id).joint_position(0) - 2.0).abs() < 1e-3);
 }
 
-/// A floating chain on the floor stays within its limits although all drives ask for too much.
+/// A floating chain on the floor stays within its effort limits although all drives demand more.
 #[test]
 fn dynamics_saturated_chain_on_the_floor() {
     let (limited, _) = saturated_chain(0.4, 0.003, 600);
     assert!(limited > 500, "{limited}");
 }
 
-/// A chain that falls from high up, and is too heavy to become fast, also satisfies inverse dynamics.
+/// A chain that falls from a height, too heavy to become fast, also satisfies inverse dynamics.
 #[test]
 fn dynamics_saturated_chain_in_the_air() {
     let (limited, checked) = saturated_chain(100.0, 0.5, 80);
@@ -94,8 +94,8 @@ fn check_efforts(
     at: &super::super::TreeState,
     before: &[f64],
 ) -> bool {
-    // Of a fast tree, spurious energy of the integration is removed (see `energy`), which is no effort of a
-    // drive.
+    // In a fast tree, spurious energy of the integration is removed (see `energy`), which is not part of a
+    // drive's effort.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.solver.touches.is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return false;
@@ -133,7 +133,7 @@ fn dynamics_drive_gives_way_beyond_its_limit() {
     assert!(sag(0.97) > 0.1, "{}", sag(0.97));
 }
 
-/// Builds a flywheel of this inertia on a motor of 2 N m that turns 10 rad/s at most.
+/// Builds a flywheel of this inertia on a motor of 2 N m with a speed limit of 10 rad/s.
 fn motor(inertia_kg_m2: f64) -> (Bench, super::super::TreeId) {
     let mut axis = Axis::along(DVec3::Z);
     (axis.effort_limit, axis.speed_limit, axis.armature) = (2.0, 10.0, inertia_kg_m2);

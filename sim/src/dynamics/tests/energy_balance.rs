@@ -1,4 +1,4 @@
-//! The bench's measure of energy: energy removed by friction, and spurious energy.
+//! The energy balance of a step: energy removed by friction, and spurious energy.
 
 use rapier3d::glamx::{DPose3, DVec3};
 
@@ -13,12 +13,12 @@ fn made(balance: &EnergyBalance) -> f64 {
     balance.made.iter().sum()
 }
 
-/// Returns the kinetic energy of all trees at present.
+/// Returns the present kinetic energy of all trees.
 fn kinetic(bench: &Bench) -> f64 {
     bench.dynamics.energy_balance(&bench.dynamics.energy_before()).kinetic
 }
 
-/// Steps and measures, with `meddle` called between the two.
+/// Runs steps and measures their energy balance. Calls `meddle` between the step and the measurement.
 fn measured(bench: &mut Bench, steps: usize, mut meddle: impl FnMut(&mut Bench)) -> Vec<EnergyBalance> {
     let step = |_| {
         let before = bench.dynamics.energy_before();

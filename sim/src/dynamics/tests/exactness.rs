@@ -1,4 +1,4 @@
-//! Tests of bit-identical reruns, for any history of Rapier's broad phase, and of errors for non-finite
+//! Tests of bit-identical reruns for any history of Rapier's broad phase, and of errors for non-finite
 //! numbers.
 
 use rapier3d::glamx::{DPose3, DVec3};
@@ -53,7 +53,7 @@ fn dynamics_reruns_are_equal_to_the_bit() {
     assert!(!first.dynamics.solver.touches.is_empty());
 }
 
-/// Contacts do not depend on pairs that were near before, or on the order in which they came near.
+/// Contacts depend neither on pairs that were near before, nor on the order in which they came near.
 #[test]
 fn dynamics_the_past_of_the_broad_phase_does_not_matter() {
     let (mut first, mut second) = (scene(), scene());
@@ -87,7 +87,7 @@ fn dynamics_restored_worlds_go_on_as_they_would_have() {
     assert!(Bench::new(DOWN).dynamics.restore(&state).is_err());
 }
 
-/// A force that is not a number ends the step with the name of the tree, and the state is unchanged.
+/// A force that is NaN ends the step with an error that names the tree. The state is unchanged.
 #[test]
 fn dynamics_divergence_is_an_error_and_changes_nothing() {
     let mut bench = scene();

@@ -17,7 +17,7 @@ fn dynamics_free_fall() {
     assert!((bench.position_m(body) - wanted_m).length() < 1e-12, "{}", bench.position_m(body));
 }
 
-/// A tumbling body keeps its angular momentum, its energy and the course of its centre of mass.
+/// A tumbling body keeps its angular momentum, its energy and the path of its centre of mass.
 #[test]
 fn dynamics_tumbling_body() {
     let mut bench = Bench::new(DVec3::ZERO);
@@ -27,7 +27,7 @@ fn dynamics_tumbling_body() {
         inertia_kg_m2: DMat3::from_diagonal(DVec3::new(0.01, 0.02, 0.028)),
     };
     let body = bench.add(lone("racket", DPose3::IDENTITY, mass));
-    // About the middle axis, which is unstable.
+    // The rotation is about the middle axis, which is unstable.
     bench.dynamics.tree_mut(body).set_base(DPose3::IDENTITY, DVec3::ZERO, DVec3::new(0.05, 10.0, 0.02));
     let (linear, angular) = momentum(bench.dynamics.tree(body));
     let energy_j = bench.energy_j(body);
@@ -46,7 +46,7 @@ fn dynamics_tumbling_body() {
     assert!(worst.0 < 1e-9 && worst.1 < 5e-3 && worst.2 < 1e-9, "{worst:?}");
 }
 
-/// Drives inside a floating tree change its momentum only by the error of the integration.
+/// Drives inside a floating tree change its momentum only by the integration error.
 #[test]
 fn dynamics_thrashing_tree_keeps_its_momentum() {
     let mut random = Random(7);
@@ -74,7 +74,7 @@ fn dynamics_thrashing_tree_keeps_its_momentum() {
     assert!(dp < 0.01 && dl < 0.01, "{dp} {dl}");
 }
 
-/// A tree that whirls without outside forces keeps its momentum and gains no energy.
+/// A tree that whirls without external forces keeps its momentum and gains no energy.
 #[test]
 fn dynamics_whirling_tree_gains_no_energy() {
     for (fast, seed) in [(40.0, 12), (150.0, 13)] {

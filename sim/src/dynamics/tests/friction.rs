@@ -10,7 +10,7 @@ use super::bench::{Bench, DOWN, DT_S, G_M_S2, lone, sliding};
 
 const HALF_M: DVec3 = DVec3::new(0.1, 0.1, 0.05);
 
-/// Builds a box at rest on a floor that gravity makes a slope towards `azimuth`.
+/// Builds a box at rest on a floor, with gravity tilted so that the floor slopes towards `azimuth_rad`.
 fn on_slope(slope_rad: f64, azimuth_rad: f64, mu: f64) -> (Bench, TreeId) {
     let (sin, cos) = slope_rad.sin_cos();
     let down = DVec3::new(sin * azimuth_rad.cos(), sin * azimuth_rad.sin(), -cos) * G_M_S2;
@@ -20,8 +20,8 @@ fn on_slope(slope_rad: f64, azimuth_rad: f64, mu: f64) -> (Bench, TreeId) {
     (bench, body)
 }
 
-/// In eight directions, a box holds 0.5 degrees below the friction angle. 0.5 degrees above it, the box
-/// slides by the expected distance, straight down.
+/// In eight directions, a box holds at 0.5 degrees below the friction angle. At 0.5 degrees above it, the box
+/// slides by the expected distance, straight down the slope.
 #[test]
 fn dynamics_slopes_at_both_sides_of_the_friction_angle() {
     let mu: f64 = 0.5;
@@ -172,7 +172,7 @@ fn dynamics_disc_stops_spinning() {
     assert!(bench.dynamics.tree(disc).link_spin_rad_s(0).length() < 1e-4);
 }
 
-/// MJCF's rule: the higher priority wins, otherwise the larger of each.
+/// MJCF's rule: the values of the higher priority, otherwise the larger of each.
 #[test]
 fn dynamics_friction_of_a_pair() {
     let floor = Friction {
@@ -196,7 +196,7 @@ fn dynamics_friction_of_a_pair() {
     let sole = Friction { slide: 0.6, priority: 1, ..floor };
     assert_eq!(Friction::between(&sole, &ball), sole);
     assert_eq!(Friction::between(&ball, &sole), sole);
-    // The share `left` applies to the resulting friction, whichever collider's values are used.
+    // The share `left` applies to the combined friction, whichever collider's values are used.
     let greasy = Friction { left: 0.5, ..ball };
     assert_eq!(Friction::between(&greasy, &sole), Friction { slide: 0.3, roll_m: 0.00005, ..sole });
     assert_eq!(Friction::between(&greasy, &greasy).lanes(), [1.0, 0.1, 0.1, 0.0025, 0.0, 0.0]);

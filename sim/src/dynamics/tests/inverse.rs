@@ -1,13 +1,14 @@
-//! Forward dynamics against an independent inverse dynamics: accelerations of points, no spatial vectors.
+//! Forward dynamics against an independent inverse dynamics, which uses accelerations of points instead of
+//! spatial vectors.
 
 use rapier3d::glamx::{DMat3, DVec3};
 
 use super::super::{Drive, Joint, Tree};
 use super::bench::{Bench, DOWN, DT_S, Random, bush, hinge, stir};
 
-/// Computes the efforts of an acceleration `a` by degree of freedom, from Newton and Euler link by link:
+/// Computes the efforts for an acceleration `a`, by degree of freedom, with Newton-Euler link by link:
 ///   c'' = o'' + dw x r + w x (w x r),  f = m (c'' - g),  n = I dw + w x I w.
-/// For a free first link these are the force on it, and the moment about its centre of mass.
+/// For a free first link, the efforts are the force on it and the moment about its centre of mass.
 pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f64> {
     let mut motion: Vec<(DVec3, DVec3, DVec3)> = Vec::new();
     let mut loads: Vec<(DVec3, DVec3)> = Vec::new();
@@ -55,7 +56,7 @@ pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f6
     gathered(tree, a, loads, dof)
 }
 
-/// Sums the loads of the links, force and moment about the world's origin, inwards along the tree.
+/// Sums the loads of the links, as force and moment about the world's origin, inwards along the tree.
 fn gathered(tree: &Tree, a: &[f64], mut loads: Vec<(DVec3, DVec3)>, mut dof: usize) -> Vec<f64> {
     let mut efforts = vec![0.0; dof];
     for index in (0..loads.len()).rev() {
@@ -96,7 +97,7 @@ fn dofs(joint: &Joint) -> usize {
 fn check(root: Joint, seed: u64) {
     let mut random = Random(seed);
     let mut tree = bush(root, &mut random);
-    // The motion is slow and gently driven, because energy that the integration made is removed from a fast
+    // The motion is slow and gently driven, because spurious energy of the integration is removed from a fast
     // tree (see `energy`).
     stir(&mut tree, &mut random, 2.0);
     let mut wanted = vec![0.0; tree.dofs()];

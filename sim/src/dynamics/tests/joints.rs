@@ -7,7 +7,7 @@ use rapier3d::prelude::SharedShape;
 use super::super::{Axis, Drive, Equality, Joint, Link, Mass, Tree};
 use super::bench::{Bench, DOWN, DT_S, G_M_S2, hinge, jointed, link, lone, sliding};
 
-/// Period of a pendulum at 0.2 rad, and its energy over 20 s.
+/// A pendulum at 0.2 rad has the exact period, and keeps its energy over 20 s.
 #[test]
 fn dynamics_pendulum() {
     let (mass_kg, length_m) = (1.3, 0.7);
@@ -77,7 +77,7 @@ fn dynamics_slide_under_a_force_and_with_dry_friction() {
     assert!((slid_m - 0.5 * (1.0 + DT_S)).abs() < 1e-9, "{slid_m}");
 }
 
-/// An arm that is driven into the end of its range at full speed, and a light finger.
+/// An arm and a light finger stop at the end of the range after being driven into it at full speed.
 #[test]
 fn dynamics_joint_stops_at_its_limit() {
     for (half_m, effort) in [(DVec3::new(0.2, 0.03, 0.03), 60.0), (DVec3::new(0.02, 0.008, 0.008), 1.5)] {
@@ -124,7 +124,7 @@ fn dynamics_coupled_joints_follow() {
     }
 }
 
-/// A welded body hangs without moving; switched off, it falls. A point that is connected stays in place.
+/// A welded body hangs without moving; with the weld off, it falls. A connected point stays in place.
 #[test]
 fn dynamics_weld_and_connect() {
     let half_m = DVec3::new(0.1, 0.05, 0.02);
@@ -158,7 +158,7 @@ fn dynamics_weld_and_connect() {
     assert!(bench.position_m(body).z < before_m - 0.5);
 }
 
-/// A top on a pin at steady precession W keeps its tilt, with I1 about the pin:
+/// A top on a pin at steady precession W keeps its tilt. With I1 about the pin,
 /// I1 W^2 cos(tilt) - I3 w3 W + m g h = 0.
 #[test]
 fn dynamics_top_precesses() {
@@ -190,7 +190,7 @@ fn dynamics_top_precesses() {
     }
 }
 
-/// A coupling that holds a hinge: the latch of a door that is pulled.
+/// A coupling that holds a hinge: the latch of a door under a pull.
 #[test]
 fn dynamics_latch_holds_a_door() {
     let half_m = DVec3::new(0.4, 0.02, 1.0);

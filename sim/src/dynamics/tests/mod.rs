@@ -1,4 +1,4 @@
-//! Closed forms, conservation, exactness.
+//! Tests against closed forms, conservation laws and exact reruns.
 
 pub mod bench;
 mod contacts;

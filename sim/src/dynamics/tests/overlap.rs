@@ -10,12 +10,12 @@ use super::super::Mass;
 use super::super::contacts::overlap::Overlap;
 use super::bench::{Bench, Random, lone, sliding};
 
-/// Distance within which Parry is asked for contacts.
+/// Distance within which Parry searches for contacts.
 const NEAR_M: f32 = 0.006;
-/// Depths below this are left as Parry reports them.
+/// Depth below which Parry's results are kept.
 const SHALLOW_M: f32 = 0.005;
-/// Tolerance for comparing depths with `least_m`, whose grid of directions is coarse. Corrected depths come
-/// from faces alone. Where two edges meet, they are wrong by as much.
+/// Tolerance for comparing depths with `least_m`, whose grid of directions is coarse. Corrected depths
+/// consider normals of faces only, and are wrong by a similar amount where two edges meet.
 const COARSE_M: f32 = 0.006;
 
 /// Builds a robot's foot: the shell of `sim/assets/robots/g1_dex3/robot.xml`.
@@ -56,8 +56,8 @@ fn deepest_m(manifold: &ContactManifold<(), ()>) -> f32 {
     -manifold.points.iter().map(|point| point.dist).fold(f32::MAX, f32::min)
 }
 
-/// Cases recorded when robots fell: a foot that touches a floor, reported 2.7, 0.7 and 0.3 m deep, and
-/// the post of a door. If Parry is fixed one day, this correction is obsolete.
+/// Cases recorded from falling robots: a foot that touches a floor, with reported depths of 2.7, 0.7 and 0.3
+/// m, and the post of a door. If Parry is fixed, this correction is obsolete.
 #[test]
 fn dynamics_parry_is_mended_where_it_went_astray() {
     let floor = SharedShape::cuboid(50.0, 50.0, 1.0);
@@ -80,7 +80,7 @@ fn dynamics_parry_is_mended_where_it_went_astray() {
     assert!(astray > 0, "Parry is right");
 }
 
-/// Returns the least overlap over many directions, which no depth may exceed by much.
+/// Returns the least overlap over many directions. No depth may clearly exceed it.
 fn least_m([a, b]: [&dyn Shape; 2], a_from_b: &Pose) -> f32 {
     let radius_m = |shape: &dyn Shape| shape.as_polygonal_feature_map().expect("not a ball").1;
     let [core_a, core_b] = [a, b].map(|shape| shape.as_polygonal_feature_map().expect("not a ball").0);
@@ -99,7 +99,7 @@ fn least_m([a, b]: [&dyn Shape; 2], a_from_b: &Pose) -> f32 {
     least_m + radius_m(a) + radius_m(b)
 }
 
-/// A foot, a plank, a post and a bottle are thrown into each other and a floor. No reported depth is too
+/// A foot, a plank, a post and a bottle are thrown at each other and at a floor. No reported depth is too
 /// large, and a corrected manifold is left alone.
 #[test]
 fn dynamics_no_depth_is_beyond_the_least_overlap() {
@@ -135,7 +135,7 @@ fn dynamics_no_depth_is_beyond_the_least_overlap() {
     assert!(met > 200, "{met}");
 }
 
-/// A foot is tilted under the edge of a table. Its face that points up the most is not the one inside
+/// A foot is tilted under the edge of a table. Its face that points up most directly is not the face inside
 /// the table.
 #[test]
 fn dynamics_what_is_deepest_is_told_whichever_face_looks_there() {

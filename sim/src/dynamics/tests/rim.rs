@@ -33,7 +33,8 @@ fn bottle(bench: &mut Bench, tilt: DVec3, spin_rad_s: DVec3, friction: Friction)
     tree
 }
 
-/// Tilt (degrees), heading of the tilt axis in the floor, spin about the vertical, and spin across that axis.
+/// Tilt (degrees), heading of the tilt axis in the floor plane, spin about the vertical, and spin across that
+/// axis.
 const ROCKS: [[f64; 4]; 8] = [
     [1.0, 0.3, 0.0, 0.6],
     [2.0, 0.0, 0.0, 0.6],
@@ -57,7 +58,7 @@ fn rocking(
     (bench, tree)
 }
 
-/// A bottle released on its rim gains no energy, whichever way it turns.
+/// A bottle released on its rim gains no energy, in whichever direction it turns.
 #[test]
 fn dynamics_bottle_that_whirls_on_its_rim_gains_nothing() {
     for rock in ROCKS {

@@ -1,14 +1,14 @@
-//! Removal of spurious kinetic energy, which no force put in, from fast trees.
+//! Removal of spurious kinetic energy from fast trees.
 //!
 //! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates.
-//! Below a twentieth of a radian per step neither matters. A fallen robot that thrashes about is faster.
-//! There the two together feed kinetic energy, the more the faster the robot is, without bound. In truth
-//! Coriolis forces do no work. With the impulses P of everything else,
+//! Below 0.05 rad per step neither matters, but a fallen robot that thrashes about is faster. At such speeds
+//! both together add kinetic energy, without bound as the speed grows. Real Coriolis forces do no work. With
+//! the impulses P of everything else,
 //!   M (v' - v) = P - dt h,   so that the work is
 //!   P . (v + v') / 2 = K(q, v') - K(q, v) + dt h . (v + v') / 2,
 //! and a step ought to end with
 //!   K = K(q, v') + dt h . (v + v') / 2.
-//! Likewise its momentum and the moment of it, H = sum I_i v_i about a fixed point, ought to be
+//! Likewise the linear momentum and the moment of momentum, H = sum I_i v_i about a fixed point, ought to be
 //!   H = H(q, v') + dt sum f_i,   f_i the Coriolis and gyroscopic forces of the links.
 //! A tree's motion is that of one rigid body with its H, plus that of its links against each other. The
 //! two are orthogonal in M (Koenig), and their energies add up. The first is set so that H is as above;
@@ -21,22 +21,22 @@ use super::link::Joint;
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
-/// Speed of a joint or of the base, rad per step, above which a tree counts as fast. Slower trees are not
-/// changed.
+/// Speed of a joint or of the base, in rad per step, above which a tree counts as fast. Slower trees are
+/// unchanged.
 pub(in crate::dynamics) const FAST_RAD: f64 = 0.05;
 
-/// Energy and momentum that a step ought to end with.
+/// Energy and momentum that a tree ought to have at the end of a step.
 pub(in crate::dynamics) struct Due {
     energy_j: f64,
-    /// Momentum about `about_m`.
+    /// Linear momentum, and angular momentum about `about_m`.
     momentum: ForceVector,
     about_m: DVec3,
 }
 
 impl Tree {
-    /// Returns the energy and momentum that the step ought to end with. `v` are the velocities that the
-    /// solver found, `w` the same whitened; the tree is in its state before the step. Returns `None` for
-    /// a slow tree or a lone body.
+    /// Returns the energy and momentum that the tree ought to have at the end of the step. `v` are the
+    /// velocities from the solver, `w` the same velocities whitened. The tree is in its state before the
+    /// step. Returns `None` for a slow tree or a lone body.
     pub(in crate::dynamics) fn due(
         &mut self,
         gravity_m_s2: DVec3,
@@ -58,15 +58,15 @@ impl Tree {
                 let coriolis = self.axis[k].dot(self.force[i]);
                 twice_j +=
                     w[k] * w[k] - self.implicit[k] * v[k] * v[k] + dt_s * coriolis * (self.v[k] + v[k]);
-                // Composite by now: of this link and all beyond it.
+                // Composite inertia of this link and all links beyond it.
                 momentum += self.inertia[i].mul(self.axis[k] * v[k]);
             }
         }
         Some(Due { energy_j: 0.5 * twice_j, momentum, about_m: self.reference_m })
     }
 
-    /// Computes the forces that the links need to move as they do without accelerating their joints,
-    /// each including all links beyond it.
+    /// Computes the force on each link, all links beyond it included, for its present motion without joint
+    /// acceleration.
     fn gyroscopic_forces(&mut self, gravity_m_s2: DVec3) {
         let lifted = MotionVector { angular: DVec3::ZERO, linear: -gravity_m_s2 };
         for i in 0..self.links.len() {
@@ -82,12 +82,12 @@ impl Tree {
         }
     }
 
-    /// Returns the number of degrees of freedom of the base that do not turn.
+    /// Returns the number of translational degrees of freedom of the base.
     fn linear_dofs(&self) -> usize {
         if matches!(self.links[0].joint, Joint::Free) { 3 } else { 0 }
     }
 
-    /// Gives a moved tree the momentum that is due, and removes its energy above that due.
+    /// Sets the momentum of a moved tree to that in `due`, and removes the energy above that in `due`.
     pub(in crate::dynamics) fn settle(&mut self, due: &Due) {
         let (whole, momentum, has_j) = self.motion();
         let (mut rigid, mut wanted) = (MotionVector::default(), MotionVector::default());
@@ -111,8 +111,7 @@ impl Tree {
         self.velocities();
     }
 
-    /// Returns the inertia of the whole tree, its momentum, and its kinetic energy including that of the
-    /// drives.
+    /// Returns the inertia and momentum of the whole tree, and its kinetic energy, drives included.
     fn motion(&self) -> (Inertia, ForceVector, f64) {
         let mut whole = Inertia::default();
         let mut momentum = ForceVector::default();
@@ -132,7 +131,7 @@ impl Tree {
     }
 }
 
-/// Returns the motion of a rigid body with this momentum, about the reference.
+/// Returns the motion about the reference of a rigid body with this inertia and momentum.
 fn rigid_motion(whole: &Inertia, momentum: ForceVector) -> MotionVector {
     let com_m = whole.first_kg_m / whole.mass_kg;
     let velocity_m_s = momentum.linear / whole.mass_kg;

@@ -18,7 +18,7 @@ use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
 impl Tree {
-    /// Sets `rhs` to -bias plus the external forces, and each link's own spatial inertia.
+    /// Sets `rhs` to -bias plus the external forces, and computes the spatial inertia of each link.
     #[inline(always)]
     pub(in crate::dynamics) fn bias(&mut self, gravity_m_s2: DVec3) {
         let count = self.links.len();
@@ -43,7 +43,7 @@ impl Tree {
         }
     }
 
-    /// Returns the inertia of a link alone.
+    /// Returns the spatial inertia of one link.
     #[inline(always)]
     pub(in crate::dynamics) fn inertia_of(&self, i: usize) -> Inertia {
         let (mass_kg, com_m) = (self.links[i].mass.mass_kg, self.centre_m(i));

@@ -10,13 +10,13 @@ use pulp::Simd;
 use super::layout::Layout;
 
 pub struct Factor {
-    /// Packed rows: M, and after [`Factor::factorise`] L, whose diagonal is 1 and not stored.
+    /// Packed rows: M, then after [`Factor::factorise`] L. The diagonal of L is 1 and not stored.
     pub h: Vec<f64>,
     d: Vec<f64>,
     pub inverse_root_d: Vec<f64>,
 }
 
-/// Smallest pivot that is inertia and not rounding: a gram at a tenth of a millimetre has 1e-11 kg m^2.
+/// Minimum pivot that is inertia rather than rounding error: 1 g at 0.1 mm has 1e-11 kg m^2.
 const SMALLEST_INERTIA: f64 = 1e-14;
 
 impl Factor {
@@ -91,7 +91,7 @@ impl Factor {
         }
     }
 
-    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero off the path of dof `k`.
+    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero off the path of degree of freedom `k`.
     #[inline(always)]
     pub fn whiten_rows<S: Simd, const N: usize>(
         &self,

@@ -17,9 +17,9 @@ const MAX_ITERATIONS: usize = 8;
 const TOLERANCE: f64 = 1e-14;
 
 impl Tree {
-    /// Computes the velocities at the end of a step without forces. For a tree of several links these
-    /// are the initial velocities, since its gyroscopic forces are part of the bias. It removes a lone
-    /// body's gyroscopic moment from the right-hand side.
+    /// Computes the velocities at the end of a step without forces. For a tree of several links these are the
+    /// initial velocities, since its bias contains the gyroscopic forces. For a lone body, the gyroscopic
+    /// moment is removed from the right-hand side.
     pub(in crate::dynamics) fn spin_freely(&mut self, dt_s: f64, v: &mut [f64]) {
         v.copy_from_slice(&self.v);
         self.half_gyration_rad_s = DVec3::ZERO;
@@ -37,8 +37,8 @@ impl Tree {
         }
     }
 
-    /// Returns the rotation of a free body in a step (rad, world axes) and its spin at the end. `moving`
-    /// is the spin by which positions move, `after` the final spin as the solver found it.
+    /// Returns the rotation of a free body in a step (rad, world axes) and its angular velocity at the end.
+    /// `moving` is the angular velocity by which positions move, `after` the final one from the solver.
     pub(in crate::dynamics) fn spin_on(&self, dt_s: f64, moving: DVec3, after: DVec3) -> (DVec3, DVec3) {
         let gyration = self.half_gyration_rad_s * 2.0;
         if gyration == DVec3::ZERO {
@@ -48,7 +48,7 @@ impl Tree {
         let pushed = moving - gyration;
         let moved = midpoint_spin(&inertia, pushed, dt_s);
         let turn_rad = (pushed + moved) * (0.5 * dt_s);
-        // In the body's axes the new spin is unchanged: the world's axes turn with the body.
+        // In body axes the new angular velocity is unchanged: the axes turn with the body.
         let carried = DQuat::from_scaled_axis(turn_rad) * DQuat::from_scaled_axis(-moved * dt_s);
         (turn_rad, carried * midpoint_spin(&inertia, after - gyration, dt_s))
     }

@@ -7,7 +7,7 @@ use super::link::Joint;
 use super::spatial::{MotionVector, turned};
 use super::tree::Tree;
 
-/// Work for the widest registers of the processor, with bit-identical results.
+/// Kinematics on the widest vector registers of the processor, with bit-identical results.
 struct Kinematics<'a> {
     tree: &'a mut Tree,
 }
@@ -90,9 +90,9 @@ impl Tree {
         }
     }
 
-    /// Moves the positions by the velocities `v` for one step, and stores `after` as velocities.
-    /// [`Tree::kinematics`] must follow. A lone body turns by the mean of its angular velocities over
-    /// the step, see [`Tree::spin_on`].
+    /// Advances the positions by one step at the velocities `v`, and stores `after` as velocities.
+    /// [`Tree::kinematics`] must follow. A lone body turns by its mean angular velocity over the step, see
+    /// [`Tree::spin_on`].
     pub(in crate::dynamics) fn integrate(&mut self, dt_s: f64, v: &[f64], after: &[f64]) {
         self.v.copy_from_slice(after);
         if let Joint::Free = self.links[0].joint {
@@ -135,7 +135,7 @@ impl Tree {
         self.velocity[link].angular
     }
 
-    /// Returns the centre of mass of a link relative to the reference.
+    /// Returns the centre of mass of a link relative to the tree's reference.
     pub(in crate::dynamics) fn centre_m(&self, link: usize) -> DVec3 {
         self.position_m[link] + self.rotation[link] * self.links[link].mass.com_m
     }

@@ -7,13 +7,12 @@ use super::link::Link;
 /// freedom of one joint are adjacent.
 #[derive(PartialEq)]
 pub struct Layout {
-    /// First degree of freedom of each link's joint; for a fixed joint that of the next moving link.
+    /// First degree of freedom of each link's joint. For a fixed joint it is that of the next moving link.
     pub first_dof: Vec<usize>,
     /// Last degree of freedom on the path to each link; `None` if the link cannot move.
     pub last_dof: Vec<Option<usize>>,
     pub link_of: Vec<usize>,
-    /// For each link, the first link that it is rigidly connected to, and the same for the parent of
-    /// that link.
+    /// For each link, the first link that it is rigidly connected to, and the same for the link's parent.
     rigid: Vec<usize>,
     rigid_parent: Vec<Option<usize>>,
     start: Vec<usize>,
@@ -55,7 +54,7 @@ impl Layout {
         layout
     }
 
-    /// Returns true if two links are rigidly connected or have one joint between them.
+    /// Returns true if two links are rigidly connected, or one joint is between them.
     pub fn are_neighbours(&self, a: usize, b: usize) -> bool {
         let (ra, rb) = (self.rigid[a], self.rigid[b]);
         ra == rb || self.rigid_parent[a] == Some(rb) || self.rigid_parent[b] == Some(ra)

@@ -1,4 +1,4 @@
-//! Components of a tree: links, their joints and masses. This module has no knowledge of robots or file
+//! Components of a tree: links, their joints and masses. This module does not depend on robots or file
 //! formats.
 
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
@@ -10,7 +10,7 @@ pub struct Link {
     pub name: String,
     /// An earlier link of the tree; `None` is the world.
     pub parent: Option<usize>,
-    /// Pose with the joint at 0; for a free link the initial pose in the world.
+    /// Pose with the joint at 0; for a free link, the initial pose in the world.
     pub parent_from_link: DPose3,
     pub joint: Joint,
     pub mass: Mass,
@@ -36,28 +36,28 @@ pub struct Axis {
     pub armature: f64,
     /// Effort of dry friction.
     pub friction_loss: f64,
-    /// Effort per velocity.
+    /// Effort per unit of velocity.
     pub damping: f64,
-    /// Effort per position away from `spring_rest`.
+    /// Effort per unit of displacement from `spring_rest`.
     pub stiffness: f64,
     pub spring_rest: f64,
-    /// Lowest and highest position.
+    /// Minimum and maximum position.
     pub range: Option<[f64; 2]>,
-    /// Maximum effort of a drive; infinite for a joint that is never driven to its limit.
+    /// Maximum effort of a drive; infinite if the drive has no limit.
     pub effort_limit: f64,
-    /// Speed at which a drive can push no further; near it, it pushes less. Infinite for a drive without
-    /// such a speed.
+    /// Speed at which a drive exerts no effort in the direction of motion; its effort falls near that speed.
+    /// Infinite for a drive without a speed limit.
     pub speed_limit: f64,
 }
 
-/// Setpoint of a joint's drive. It stays in effect until it is replaced and is not part of a state.
+/// Setpoint of a joint's drive. It stays in effect until it is replaced, and is not part of the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
     /// Target position, rad or m.
     pub target: f64,
-    /// Effort per position.
+    /// Effort per unit of position error.
     pub kp: f64,
-    /// Effort per velocity; the damper acts on the joint's own velocity.
+    /// Effort per unit of joint velocity.
     pub kd: f64,
     /// Constant effort, N m or N.
     pub feedforward: f64,
@@ -129,7 +129,7 @@ pub struct Mass {
 }
 
 impl Mass {
-    /// Mass of links that only carry others, for example the link between two joints in a row.
+    /// Mass of links that only carry others, for example between two joints in series.
     pub const NONE: Mass = Mass { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
 
     pub fn from_rapier(mass: &MassProperties) -> Mass {
@@ -142,7 +142,7 @@ impl Mass {
         }
     }
 
-    /// Returns the mass of a solid box of uniform density, centred.
+    /// Returns the mass of a solid box of uniform density, centred at the link's origin.
     pub fn of_box(mass_kg: f64, half_extents_m: DVec3) -> Mass {
         let s = half_extents_m * half_extents_m * (mass_kg / 3.0);
         let inertia_kg_m2 = DMat3::from_diagonal(DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y));

@@ -1,4 +1,4 @@
-//! All trees of a world, and the offsets of their degrees of freedom.
+//! Trees of a world, and the offsets of their degrees of freedom.
 
 pub mod abreast;
 pub mod energy;
@@ -26,7 +26,7 @@ use tree::Tree;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TreeId(pub(in crate::dynamics) u16);
 
-/// A link of a tree of a world.
+/// Identifier of a link: its tree and its index in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LinkId {
     pub tree: TreeId,
@@ -47,9 +47,9 @@ impl TreeId {
 #[derive(Default)]
 pub struct Trees {
     pub all: Vec<Tree>,
-    /// First degree of freedom of each tree among all.
+    /// Index of each tree's first degree of freedom among those of all trees.
     pub offset: Vec<usize>,
-    /// Trees with joints, grouped by layout, and trees without.
+    /// Trees with joints, grouped by layout, and trees without joints.
     pub alike: Vec<Alike>,
     pub jointless: Vec<usize>,
 }
@@ -72,7 +72,7 @@ impl Trees {
         id
     }
 
-    /// Assigns the next tree to a group of its layout.
+    /// Adds the next tree to the group of its layout.
     fn set_beside(&mut self, layout: &Layout) {
         let next = self.all.len();
         let is_like = |alike: &&mut Alike| self.all[alike.trees[0]].layout == *layout;
@@ -90,7 +90,7 @@ impl Trees {
         self.offset.last().zip(self.all.last()).map_or(0, |(offset, tree)| offset + tree.dofs())
     }
 
-    /// Returns each tree with its range among all degrees of freedom.
+    /// Returns each tree with its range among the degrees of freedom of all trees.
     pub fn ranges(&mut self) -> impl Iterator<Item = (&mut Tree, std::ops::Range<usize>)> {
         self.all.iter_mut().zip(&self.offset).map(|(tree, offset)| {
             let range = *offset..offset + tree.dofs();
@@ -134,7 +134,7 @@ impl Trees {
         }
     }
 
-    /// Returns true if a link can move. Otherwise it is part of the world.
+    /// Returns true if a link can move. A link that cannot move is part of the world.
     pub fn moves(&self, link: LinkId) -> bool {
         self.all[link.tree.index()].layout.last_dof[link.link].is_some()
     }
@@ -147,8 +147,8 @@ impl Trees {
         self.all[link.tree.index()].world_from_link(link.link)
     }
 
-    /// Appends N rows whose unit impulses act on the second body by `wrenches` and on the first by their
-    /// opposite; `None` is the world. `wrenches` takes the tree's reference point. Returns the inverse
+    /// Appends N rows, whose unit impulses apply `wrenches` to the second body and the opposite to the first.
+    /// A body that is `None` is the world. `wrenches` takes the tree's reference point. Returns the inverse
     /// masses.
     #[inline(always)]
     pub fn push_rows<S: Simd, const N: usize>(

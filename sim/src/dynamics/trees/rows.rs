@@ -1,4 +1,4 @@
-//! Sparse whitened rows of constraints, and the velocities that they act on.
+//! Sparse whitened constraint rows, and the velocities that they act on.
 
 use std::ops::{Deref, DerefMut, Range};
 
@@ -7,10 +7,9 @@ use pulp::Simd;
 use super::spatial::ForceVector;
 use super::tree::Tree;
 
-/// Groups of N rows that share their columns: the non-zero columns of each group, and Y in them (see
-/// `factor`).
+/// Groups of N rows with the same non-zero columns, and the entries of Y in these columns (see `factor`).
 pub struct ConstraintRows<const N: usize> {
-    /// The last group, column by column, until another one begins.
+    /// Entries of the last group, column by column, until another group begins.
     y: Vec<[f64; N]>,
     column: Vec<u16>,
     /// The blocks of all groups.
@@ -22,13 +21,13 @@ pub struct ConstraintRows<const N: usize> {
 /// other.
 const SIDE: usize = 4;
 
-/// Columns of a group that are adjacent both in the group and among all, each at its place in the sums.
-/// The other places do not belong to the group.
+/// Columns that are adjacent both in their group and among all columns, each at its position in the partial
+/// sums. Other positions do not belong to the group.
 struct RowBlock<const N: usize> {
-    /// Zero at other places.
+    /// Entries of Y; zero at positions outside the group.
     y: [Quad; N],
-    /// Bits combined with the sum: zeros at places of the group, and at other places zeros of the other
-    /// sign, whose addition changes nothing.
+    /// Bits that are combined with the sum: +0 at positions of the group, and -0 at all others, whose
+    /// addition changes nothing.
     nothing: Quad,
     /// Start of the block in [`Whitened`].
     first: usize,
@@ -38,7 +37,7 @@ struct RowBlock<const N: usize> {
 #[repr(align(32))]
 struct Quad([f64; SIDE]);
 
-/// Whitened velocities of all trees, with margins on both sides for blocks that extend beyond them.
+/// Whitened velocities of all trees, with margins at both ends for blocks that extend beyond the trees.
 pub struct Whitened(Vec<f64>);
 
 const MARGIN: usize = SIDE - 1;
@@ -89,13 +88,13 @@ impl<const N: usize> ConstraintRows<N> {
         self.groups.clear();
     }
 
-    /// Begins a group; groups are adjacent.
+    /// Begins a group. The columns of a group are contiguous.
     pub fn begin(&mut self) {
         self.y.clear();
         self.column.clear();
     }
 
-    /// Returns the number of columns that the group has now.
+    /// Returns the present number of columns of the group.
     pub fn columns(&self) -> usize {
         self.column.len()
     }
@@ -121,7 +120,7 @@ impl<const N: usize> ConstraintRows<N> {
         tree.factor.whiten_rows(simd, &tree.layout, last, &mut self.y[first..]);
     }
 
-    /// Appends unit rows of one degree of freedom, `scale` in every row.
+    /// Appends unit rows of one degree of freedom, multiplied by the row's `scale`.
     #[inline(always)]
     pub fn push_dof<S: Simd>(&mut self, simd: S, tree: &Tree, offset: usize, dof: usize, scale: [f64; N]) {
         let first = self.y.len();
@@ -134,7 +133,7 @@ impl<const N: usize> ConstraintRows<N> {
         tree.factor.whiten_rows(simd, &tree.layout, dof, &mut self.y[first..]);
     }
 
-    /// Adds a second part on the same tree, from the column `second` of the group on, to the first,
+    /// Adds a second part of the group on the same tree, which begins at column `second`, to the first part
     /// where their paths coincide.
     pub fn merge(&mut self, second: usize) {
         let paths = (0..second).zip(second..self.column.len());
@@ -151,7 +150,7 @@ impl<const N: usize> ConstraintRows<N> {
         self.column.truncate(self.column.len() - shared);
     }
 
-    /// Ends the group. Returns Y Y^T: inverse masses.
+    /// Ends the group. Returns the inverse masses Y Y^T.
     #[inline(always)]
     pub fn close(&mut self) -> [[f64; N]; N] {
         let first = self.blocks.len();
@@ -171,7 +170,7 @@ impl<const N: usize> ConstraintRows<N> {
         a
     }
 
-    /// Makes a block of the column at this place of the group and its neighbours. Returns their number.
+    /// Makes a block of the column at this position in the group and its neighbours. Returns their number.
     #[inline(always)]
     fn push_block(&mut self, place: usize) -> usize {
         let begin = place % SIDE;

@@ -1,4 +1,4 @@
-//! Spatial vectors and inertias: world axes, about one reference point per tree, f64.
+//! Spatial vectors and inertias in f64, in world axes and about one reference point per tree.
 //!
 //! Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 2.
 
@@ -7,7 +7,8 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 use rapier3d::math::Pose;
 
-/// Velocity, acceleration or joint axis: `angular` [rad/s], `linear` [m/s] of the point at the reference.
+/// Velocity, acceleration or joint axis: `angular` [rad/s], and `linear` [m/s] of the body's point at the
+/// reference.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct MotionVector {
     pub angular: DVec3,
@@ -22,7 +23,7 @@ pub struct ForceVector {
 }
 
 impl MotionVector {
-    /// Computes v x m, the rate of a motion vector that moves with v.
+    /// Computes v x m, the rate of change of a motion vector that moves with v.
     #[inline]
     pub fn cross(self, m: MotionVector) -> MotionVector {
         MotionVector {
@@ -31,7 +32,7 @@ impl MotionVector {
         }
     }
 
-    /// Computes v x* f, the rate of a force vector that moves with v.
+    /// Computes v x* f, the rate of change of a force vector that moves with v.
     #[inline]
     pub fn cross_force(self, f: ForceVector) -> ForceVector {
         ForceVector {
@@ -45,7 +46,7 @@ impl MotionVector {
         self.angular.dot(f.angular) + self.linear.dot(f.linear)
     }
 
-    /// Returns the velocity of a point given relative to the reference.
+    /// Returns the velocity of the body's point at `point_m`, relative to the reference.
     #[inline]
     pub fn at(self, point_m: DVec3) -> DVec3 {
         self.linear + self.angular.cross(point_m)
@@ -53,7 +54,7 @@ impl MotionVector {
 }
 
 impl ForceVector {
-    /// Creates a force that acts at a point given relative to the reference.
+    /// Creates a force that acts at `point_m`, relative to the reference.
     #[inline]
     pub fn at(point_m: DVec3, force_n: DVec3) -> ForceVector {
         ForceVector { angular: point_m.cross(force_n), linear: force_n }
@@ -204,7 +205,7 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// Computes I v: the momentum of a velocity, or the force of an acceleration.
+    /// Computes I v: the momentum for a velocity, or the force for an acceleration.
     #[inline]
     pub fn mul(&self, v: MotionVector) -> ForceVector {
         ForceVector {
@@ -223,7 +224,7 @@ impl AddAssign for Inertia {
     }
 }
 
-/// Turns by the rotation vector `turn_rad`, world axes.
+/// Returns a rotation turned further by the rotation vector `turn_rad`, in world axes.
 #[inline]
 pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     if turn_rad == DVec3::ZERO {
@@ -232,7 +233,7 @@ pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-/// Converts the pose to single precision, which colliders and all modules outside of dynamics use.
+/// Converts the pose to single precision, which colliders and all modules outside `dynamics` use.
 pub(crate) fn rounded(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

@@ -7,7 +7,7 @@ use super::link::Joint;
 use super::spatial::ForceVector;
 use super::tree::Tree;
 
-/// All state of a tree that outlasts a step, in full precision.
+/// State of a tree that outlasts a step, in full precision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TreeState {
     base: DPose3,
@@ -35,20 +35,20 @@ impl Tree {
         limit.is_finite().then(|| self.joint_velocity(link).abs() / limit)
     }
 
-    /// Returns the distance of a hinge (rad) or slide (m) beyond its range; 0 within it, and for other
-    /// joints.
+    /// Returns the distance of a hinge (rad) or slide (m) beyond its range. Returns 0 within the range, and
+    /// for other joints.
     pub fn beyond_range(&self, link: usize) -> f64 {
         let range = self.links[link].joint.axis().and_then(|axis| axis.range);
         range.map_or(0.0, |[low, high]| (low - self.q[link]).max(self.q[link] - high).max(0.0))
     }
 
     /// Returns the mean effort of a joint's drive over the last step (N m or N). It is within the effort
-    /// limit, unless the drive brakes a motion faster than its own limit.
+    /// limit, unless the drive brakes a motion faster than the drive's speed limit.
     pub fn drive_effort(&self, link: usize) -> f64 {
         self.effort[link]
     }
 
-    /// Sets the position and velocity of a hinge or slide; no effect on other joints.
+    /// Sets the position and velocity of a hinge or slide. Other joints are unchanged.
     pub fn set_joint(&mut self, link: usize, position: f64, velocity: f64) {
         if self.links[link].joint.axis().is_some() {
             self.q[link] = position;
@@ -57,8 +57,8 @@ impl Tree {
         }
     }
 
-    /// Sets the pose and velocity of a free tree; the velocity is that of the first link's origin. No
-    /// effect on a fixed tree.
+    /// Sets the pose of a free tree, and the velocity of the origin of its first link. A fixed tree is
+    /// unchanged.
     pub fn set_base(&mut self, world_from_base: DPose3, velocity_m_s: DVec3, spin_rad_s: DVec3) {
         if matches!(self.links[0].joint, Joint::Free) {
             self.base = world_from_base;
@@ -69,7 +69,7 @@ impl Tree {
         }
     }
 
-    /// Applies a force (N, world axes) at a point (world frame) of a link in the next step; forces add up.
+    /// Applies a force (N, world axes) at a point (world frame) of a link in the next step. Forces add up.
     pub fn push(&mut self, link: usize, point_m: DVec3, force_n: DVec3) {
         self.external[link] += ForceVector::at(point_m - self.reference_m, force_n);
     }
@@ -96,12 +96,12 @@ impl Tree {
         }
     }
 
-    /// Returns true if a state is one of a tree like this.
+    /// Returns true if the state belongs to a tree of the same structure.
     pub(in crate::dynamics) fn fits(&self, state: &TreeState) -> bool {
         state.q.len() == self.q.len() && state.v.len() == self.v.len()
     }
 
-    /// Restores a state that fits.
+    /// Restores a state for which [`Tree::fits`] is true.
     pub(in crate::dynamics) fn restore(&mut self, state: &TreeState) {
         self.base = state.base;
         self.q.clone_from(&state.q);

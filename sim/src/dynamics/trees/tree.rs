@@ -9,8 +9,8 @@ use super::link::{Drive, DriveLaw, Joint, Link, Mass};
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use crate::dynamics::rest::Rest;
 
-/// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link,
-/// a lone object a tree of one free link.
+/// Tree of links that joints connect. A robot is a tree with a free first link, a door a tree with a fixed
+/// first link, and a lone object a tree of one free link.
 ///
 /// The degrees of freedom are in the order of the links. A free joint has the velocity of the link's
 /// centre of mass and its angular velocity, both in world axes; a hinge or slide has one. The centre of
@@ -31,22 +31,22 @@ pub struct Tree {
     pub(in crate::dynamics) laws: Vec<DriveLaw>,
     /// True if a link's drive is a row of the solver in this step, by link.
     pub(in crate::dynamics) bounded: Vec<bool>,
-    /// True if a joint would leave its range in this step although it was not near an end, by link.
+    /// True if a joint would leave its range in this step although it was not near either end, by link.
     pub(in crate::dynamics) overrun: Vec<bool>,
     /// External forces, by link, about the reference; they act only in the next step.
     pub(in crate::dynamics) external: Vec<ForceVector>,
     /// Efforts of the drives in the last step, by link.
     pub(in crate::dynamics) effort: Vec<f64>,
-    /// Impulses of dry friction in the last step, by link, with which the next begins.
+    /// Impulses of dry friction in the last step, by link. The next step begins with them.
     pub(in crate::dynamics) dry_friction: Vec<f64>,
     /// State of a body that may sleep; `None` for all other trees.
     pub(in crate::dynamics) rest: Option<Rest>,
     /// Velocities at the end of an unconstrained step, by degree of freedom.
     pub(in crate::dynamics) unconstrained: Vec<f64>,
-    /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a
-    /// fixed one.
+    /// Origin of the spatial vectors, world frame: the centre of mass of a free first link, or the origin of
+    /// a fixed one.
     pub(in crate::dynamics) reference_m: DVec3,
-    /// Rotations of links in their parents with their joints at 0.
+    /// Rotation of each link in its parent with the joint at 0.
     pub(in crate::dynamics) parent_from_link_rotation: Vec<DMat3>,
     pub(in crate::dynamics) rotation: Vec<DMat3>,
     /// Origins of the links relative to the reference.
@@ -64,7 +64,7 @@ pub struct Tree {
     pub(in crate::dynamics) implicit: Vec<f64>,
     pub(in crate::dynamics) rhs: Vec<f64>,
     pub(in crate::dynamics) factor: Factor,
-    /// Half of the change of spin by [`Tree::spin_freely`].
+    /// Half of the change in angular velocity by [`Tree::spin_freely`].
     pub(in crate::dynamics) half_gyration_rad_s: DVec3,
 }
 
@@ -139,13 +139,13 @@ impl Tree {
         self.links.len() == 1 && matches!(self.links[0].joint, Joint::Free)
     }
 
-    /// Returns true if the tree is left out of steps.
+    /// Returns true if steps leave the tree out.
     #[inline]
     pub(in crate::dynamics) fn is_asleep(&self) -> bool {
         self.rest.is_some_and(|rest| rest.is_asleep)
     }
 
-    /// Replaces the mass of a link, from the next step on. It is part of the set-up, not of the state.
+    /// Replaces the mass of a link, from the next step on. The mass is part of the set-up, not of the state.
     pub fn set_mass(&mut self, link: usize, mass: Mass) {
         self.own_inertia[link] = Symmetric::of(&mass.inertia_kg_m2);
         self.links[link].mass = mass;

@@ -39,7 +39,7 @@ pub(super) const OBSERVED: [&str; OBSERVED_JOINTS] = [
     "right_wrist_yaw",
 ];
 
-/// Joints of the actions: those of the legs, and the waist's roll and pitch.
+/// Joints of the actions: all joints of the legs, and the waist's roll and pitch.
 pub(super) const CONTROLLED: [&str; CONTROLLED_JOINTS] = [
     "left_hip_pitch",
     "right_hip_pitch",

@@ -1,14 +1,14 @@
 //! A base controller trained elsewhere: a velocity policy as an ONNX file, of the kind that AGILE
 //! exports for the G1.
 //!
-//! The policy normally receives the commands unchanged. With a loop over its place (`place`) it receives
-//! instead the velocity that keeps the robot where the commands would have taken it. The loop uses the
-//! robot's own estimate of its place.
+//! The policy normally receives the commands unchanged. With the position loop (`place`) it instead receives
+//! the velocity that keeps the robot at the place to which the commands would have moved it. The loop uses
+//! the robot's own estimate of its pose.
 //!
 //! The policy runs once per control step and drives the legs by PD targets with its own gains. It also
-//! balances with the roll and pitch of the waist, which belong to the task here. So the policy observes
-//! them minus the task's targets, as if the task had commanded an upright waist, and its targets for
-//! them are added to the task's.
+//! balances with the roll and pitch of the waist, which belong to the task here. Therefore the policy
+//! observes these joints minus the task's targets, as if the task had commanded an upright waist. Its targets
+//! for them are added to the task's targets.
 
 mod joints;
 mod motors;
@@ -38,7 +38,7 @@ const LIMITS: BaseLimits = BaseLimits {
     // The policy has no height command; it stands and walks here.
     pelvis_height_m: [0.73, 0.73],
 };
-/// Total downward pull on the hands (N) that suspends the loop. A robot with such a load leans, and
+/// Total downward pull on the hands (N) that suspends the position loop. A robot with such a load leans, and
 /// would walk forever towards its reference place.
 const HEAVY_N: f32 = 50.0;
 
@@ -60,7 +60,7 @@ struct AgileState {
 }
 
 impl Agile {
-    /// Creates a controller; `looped` adds the loop over its place.
+    /// Creates a controller; `looped` adds the position loop.
     pub fn new(network: Arc<Network>, looped: bool) -> Agile {
         Agile { network, joints: JointMap::new(), looped, state: None }
     }

@@ -1,4 +1,4 @@
-//! The policy that drives all of a robot's motors, as in a program for a real G1: with the policy's gains,
+//! Control of all of a robot's motors by a policy, as in a program for a real G1: with the policy's gains,
 //! and without a base controller.
 
 use std::sync::Arc;
@@ -9,8 +9,8 @@ use super::observe;
 use crate::body::{BodyEstimate, MotorSetpoints, UPPER, UPPER_JOINTS, joint_names};
 use crate::locomotion::{BaseCommand, MotorController};
 
-/// Gains (N m/rad, N m s/rad) of the joints that the policy does not control, by the first part of a name
-/// that occurs in theirs. LeRobot sends these to a G1.
+/// Gains (N m/rad, N m s/rad) of the joints that the policy does not control. The first entry whose text
+/// occurs in a joint's name applies. LeRobot sends these gains to a G1.
 const HELD: [(&str, [f32; 2]); 5] = [
     ("waist_yaw", [250.0, 5.0]),
     ("wrist", [40.0, 1.5]),

@@ -1,4 +1,4 @@
-//! The ONNX file of a velocity policy: its required tensors, and how it is run.
+//! Loading and running of a velocity policy's ONNX file, and the tensors that it must have.
 //!
 //! The network takes `root_link_quat_w`, `root_ang_vel_b`, `velocity_commands`, `joint_pos` and `joint_vel`.
 //! It returns `action_joint_pos`, `action_joint_pos_kp_gains` and `action_joint_pos_kd_gains`. Every other
@@ -34,9 +34,9 @@ const SENSED: [(&str, usize); 5] = [
     (POSITIONS, OBSERVED_JOINTS),
     (VELOCITIES, OBSERVED_JOINTS),
 ];
-/// Targets (rad), stiffness (N m/rad), damping (N m s/rad).
+/// Names of the outputs for targets (rad), stiffness (N m/rad) and damping (N m s/rad).
 const ACTIONS: [&str; 3] = ["action_joint_pos", "action_joint_pos_kp_gains", "action_joint_pos_kd_gains"];
-/// Suffix that a memory's output has after the input's name.
+/// Suffix of a memory's output, after the name of its input.
 const FED_BACK: &str = "_out";
 /// Number of warm-up steps: more than the five frames of a history, so that the actions in it have settled.
 const STEPS_TO_REMEMBER: usize = 25;
@@ -180,9 +180,9 @@ impl Network {
         Ok(())
     }
 
-    /// Returns the memory of a robot that has stood as in `observation` for half a second, acting as the
-    /// policy asked. Without such a past, the robot would be thrown into the policy's own stance: it
-    /// hops a third of a metre.
+    /// Returns the memory of a robot that has stood as in `observation` for half a second and has followed
+    /// the policy's actions. Without this warm-up, the policy would throw the robot into its own stance, with
+    /// a hop of a third of a metre.
     pub(super) fn remember(&self, observation: &NetworkInputs) -> RunResult<RecurrentState> {
         let mut memory = self.blank();
         for _ in 0..STEPS_TO_REMEMBER {

@@ -1,4 +1,5 @@
-//! Outer loop of a velocity policy: keeps the robot where its commands would have taken it.
+//! Position loop around a velocity policy: keeps the robot at the place to which its commands would have
+//! moved it.
 //!
 //! A velocity policy ignores commands below 0.1 m/s, walks slower than commanded and creeps while it
 //! settles. A reference place moves with the command. While the robot is commanded to move, or has
@@ -29,7 +30,7 @@ const LARGEST_INTEGRAL_M_S: [f32; 2] = [0.5, 0.3];
 const SMALLEST_COMMAND: [f32; 3] = [-0.6, -0.4, -0.8];
 const LARGEST_COMMAND: [f32; 3] = [0.8, 0.4, 0.8];
 
-/// The pose that the commands have moved the robot's reference to.
+/// Reference pose, which the commands move.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ReferencePlace {
     position_m: [f32; 2],

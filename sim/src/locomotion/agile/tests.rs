@@ -262,7 +262,8 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     assert!(waist_rad > 2e-3, "{waist_rad}");
 }
 
-/// At the motors the policy's joints have its own gains; the others keep their commands.
+/// Without a base controller, the policy's joints have the policy's gains; the other joints follow their
+/// commands.
 #[test]
 fn a_policy_at_the_motors_leaves_arms_to_the_command() {
     let network = Arc::new(read(limp(50.0)).unwrap());

@@ -10,8 +10,8 @@ use crate::plane::flat;
 const POSITION_GAIN_1_S: f32 = 1.0;
 const BIAS_GAIN_1_S2: f32 = 1.0;
 const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
-/// Maximum distance by which the reference may lead. A robot that was pushed farther off its way does not
-/// return to the reference.
+/// Maximum distance by which the reference may lead the robot. A robot that was pushed farther off its path
+/// does not return to the reference.
 const LEASH_M: f32 = 0.15;
 const LARGEST_ERROR_M: f32 = 0.3;
 
@@ -38,8 +38,8 @@ impl Course {
         [ahead, left]: [Vector; 2],
         dt_s: f32,
     ) -> [f32; 2] {
-        // A robot that is to stop takes its present place as reference and drops the bias, which was learned
-        // in another direction of motion.
+        // A robot that is commanded to stop takes its present position as reference and drops the bias, which
+        // was learned in another direction of motion.
         let stopping = velocity == BaseVelocity::STILL;
         if starts || stopping {
             self.reference_m = pelvis_m;

@@ -26,14 +26,14 @@ const CORRECTIONS: usize = 2;
 const MIN_HEIGHT_M: f32 = 0.4;
 /// Damping of the legs' inverse: a knee that is almost straight must not demand the impossible.
 const DAMPING: f32 = 0.004;
-/// Damping of the ground force inferred from torques. With twenty times as much, half of a pull on a
-/// leaning robot is not seen: its legs are almost straight.
+/// Damping of the ground force inferred from torques. With twenty times this damping, half of a pull on a
+/// leaning robot is not detected: its legs are almost straight.
 const FORCE_DAMPING: f32 = 0.0002;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
-/// Share of the joints' limits within which torques stay as long as easing off helps.
+/// Share of the joints' torque limits that torques may use, as long as reducing the wanted motion helps.
 const EFFORT_USED: f32 = 0.9;
-/// Shares of the wanted turning and of the feet's acceleration that remain when a robot eases off completely.
+/// Shares of the wanted turning and of the feet's acceleration that remain at full reduction.
 const EASED_TURN: f32 = 0.64;
 const EASED_FEET: f32 = 0.2;
 
@@ -48,7 +48,7 @@ pub(super) struct WantedMotion {
 /// Place where the ground acts on the feet.
 pub(super) struct GroundContact {
     pub pressure_m: Vector,
-    /// The only stance foot; `None` for both.
+    /// The only stance foot; `None` if both feet stand.
     pub foot: Option<Side>,
 }
 
@@ -100,9 +100,9 @@ pub(super) fn leg_torques_within_limits(
     }
 }
 
-/// Computes the torques of both legs. The sideways acceleration of the pelvis is such that the ground
-/// force has no moment about the pressure point. Its turning is no harder than one foot can hold. Both
-/// are linear in the pelvis's acceleration, and found by correcting it [`CORRECTIONS`] times.
+/// Computes the torques of both legs. The sideways acceleration of the pelvis is such that the ground force
+/// has no moment about the pressure point. The turning acceleration is limited to what one foot can hold.
+/// Both are linear in the pelvis's acceleration, and found by correcting it [`CORRECTIONS`] times.
 fn leg_torques(
     body: &BodyEstimate,
     load: &Load,
@@ -240,7 +240,7 @@ pub(super) fn ground_force_n(
 }
 
 /// Returns the Jacobian of a foot: linear over angular velocity per joint velocity of its leg. Without an
-/// ankle's roll, the last column is that of rolling on the sole.
+/// ankle roll joint, the last column is that of rolling on the sole.
 fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;

@@ -14,11 +14,11 @@ use crate::plane::flat;
 /// Range of footholds relative to the stance foot, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
 const SPREAD_M: [f32; 2] = [0.08, 0.52];
-/// Range of footholds without strain; those of walking sideways are inside.
+/// Range of footholds without strain; footholds of sideways walking are within it.
 const EASY_REACH_M: [f32; 2] = [-0.22, 0.3];
 const EASY_SPREAD_M: [f32; 2] = [0.12, 0.46];
-/// Paces to choose from, beside the gait's own. The capture point diverges exponentially, so a robot
-/// that was hit hurries to need a nearer foothold. At twice the pace of the gait the hips saturate as
+/// Paces to choose from, in addition to the gait's own pace. The capture point diverges exponentially, so a
+/// robot that was hit hurries to need a nearer foothold. At twice the pace of the gait the hips saturate as
 /// the foot lifts, and it meets the ground 15 cm before its foothold. Tuned on punches at shoulders and
 /// elbows, seeds 2000-2159.
 const FASTER: [f32; 4] = [1.175, 1.35, 1.525, 1.7];
@@ -29,7 +29,7 @@ const MISS: f32 = 0.1;
 /// Maximum distance of the centre of pressure from the sole's centre: along and across the foot.
 const PRESSURE_M: [f32; 2] = [0.075, 0.018];
 
-/// Inputs of a footstep. Horizontal vectors, world frame.
+/// Inputs of the plan. Vectors are horizontal, in the world frame.
 pub(super) struct FootstepInputs<'a> {
     pub scale: &'a BodyScale,
     pub gait: &'a Gait,

@@ -11,7 +11,7 @@ pub(super) const PERIOD_S: f32 = TRANSFER_S + SWING_S;
 const WIDTH_M: f32 = 0.24;
 /// Extra width per length of a sideways step: walking sideways brings the feet together at every other step.
 const WIDENING: f32 = 0.3;
-/// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned
+/// Angular momentum of a swinging leg per speed of its foot, divided by mass and height of the robot; tuned
 /// on punches, seeds 2000-3149.
 pub(super) const SWING_INERTIA: f32 = 0.09;
 
@@ -26,7 +26,8 @@ pub(super) struct Gait {
 
 impl Gait {
     /// Computes the gait. With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
-    ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
+    ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,
+    ///   width (E G + 1 - K) / (E G + 1)  to the inside.
     /// The foot that swings 2 v T ahead adds the remainder of s u to the capture point when it lands.
     /// This is 2 v T s e^{w a} with a the time from the middle of its flight: b is smaller by that over
     /// E G - 1. To the sides b is unchanged, because robots that start to walk sideways have no room for

@@ -39,7 +39,7 @@ pub(super) fn nearest_support_m(scale: &BodyScale, point_m: Vector, soles: Sides
     middle_m + flat(turn * inside_m)
 }
 
-/// Returns the shares of two feet of a load at a point of the line between their soles.
+/// Returns the share of each foot in a load that acts at a point of the line between the soles.
 fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     let across = flat(soles.left.translation - soles.right.translation);
     let along_line = flat(point_m - soles.right.translation).dot(across) / across.length_squared();
@@ -47,12 +47,12 @@ fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     Sides { left, right: 1.0 - left }
 }
 
-/// Returns the point of that line at which the load has these shares.
+/// Returns the point of the line between the soles at which a load has these shares.
 fn between_m(soles: Sides<Pose>, share: Sides<f32>) -> Vector {
     soles.left.translation * share.left + soles.right.translation * share.right
 }
 
-/// Returns the nearest point of a sole, in its frame.
+/// Returns the point of a sole nearest to `point_in_sole_m`, in the sole's frame.
 fn within_sole_m(scale: &BodyScale, point_in_sole_m: Vector) -> Vector {
     let length_m = scale.along_sole_m(SOLE_HALF_LENGTH_M);
     let width_m = scale.across_sole_m(SOLE_HALF_WIDTH_M);
@@ -119,8 +119,8 @@ pub(super) fn distribute(
     })
 }
 
-/// Returns the force (N) on the left foot, whose opposite acts on the right one, of a moment about the
-/// vertical:
+/// Returns the force (N) on the left foot that, with the opposite force on the right foot, gives a moment
+/// about the vertical:
 ///   d x f = m z,   d from the right sole to the left one.
 pub(super) fn couple_n(moment_n_m: f32, soles: Sides<Pose>) -> Vector {
     let apart_m = flat(soles.left.translation - soles.right.translation);

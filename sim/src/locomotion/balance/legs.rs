@@ -21,8 +21,8 @@ pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
     if length < 1e-6 { sine * 2.0 } else { sine * (2.0 * length.atan2(q.w) / length) }
 }
 
-/// Returns joint origins, joint axes and foot pose for a pelvis pose and leg angles. Without
-/// an ankle's roll, the last are those of its sole.
+/// Returns joint origins, joint axes and foot pose for a pelvis pose and leg angles. Without an ankle roll
+/// joint, the last origin and axis are those of rolling on the sole.
 fn forward(
     model: &RobotModel,
     side: Side,

@@ -1,4 +1,4 @@
-//! Loads as seen by the balance: a wrench about the centre of mass, and the point to balance over.
+//! Loads for the balance: a wrench about the centre of mass, and the point to balance over.
 
 use rapier3d::math::Vector;
 
@@ -86,8 +86,8 @@ impl Load {
         }
         let weights_point_m = balanced_m(force_n, moment_n_m);
         for (hand_n, palm_m) in body.hand_reaction_n.into_iter().zip(palms_m) {
-            // A sideways pull is part of the push. A moment about the vertical is known from the hands
-            // alone: the push acts over the centre of mass.
+            // A sideways pull is part of the push. A moment about the vertical can only be measured at the
+            // hands: the push acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
         let largest_turn_n_m =

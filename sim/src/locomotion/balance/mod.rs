@@ -47,11 +47,11 @@ const FARTHER_M: f32 = 0.01;
 const SIDEWAYS_M: f32 = 0.005;
 /// Distance of the capture point from the middle of the feet within which both feet count as equally near.
 const EITHER_FOOT_M: f32 = 0.01;
-/// Weight of the spin in choosing the swing leg. A leg that swings ahead turns the pelvis to its own
-/// side, and one that swings back to the other. A robot that a blow has set spinning steps with the leg
-/// that stops the spin, which is the one that the spin carries along. This weight, times the spin and
-/// the capture point's distance ahead, counts like its distance to the side. Tuned on punches at
-/// shoulders and elbows, seeds 2000-2099.
+/// Weight of the spin in choosing the swing leg. A leg that swings forward turns the pelvis to that leg's
+/// side, and a leg that swings backward to the other side. A robot that a blow has set spinning steps with
+/// the leg that stops the spin, which is the leg that the spin carries along. This weight, times the spin and
+/// the capture point's distance ahead, counts like the capture point's distance to the side. Tuned on punches
+/// at shoulders and elbows, seeds 2000-2099.
 const SPIN_S_RAD: f32 = 1.0;
 /// Minimum time of standing after planting before another change of mode.
 const MIN_STANDING_S: f32 = 0.1;
@@ -87,7 +87,8 @@ struct BalanceState {
     quick_observer: PushObserver,
     ahead: Ahead,
     partner: Partner,
-    /// Place of a robot that stands with empty hands or was pushed then, and of one that commands move.
+    /// Place of a robot that stands with empty hands or was pushed out of that stance, or of a robot that
+    /// commands move.
     place: Option<StandingPlace>,
 }
 
@@ -180,9 +181,9 @@ impl BalanceState {
         }
     }
 
-    /// Returns the commanded velocity. For a robot that is to stand it may return the velocity to its
-    /// place. That is so if the robot was pushed out of its stance, or has not reached the place that
-    /// commands took it to.
+    /// Returns the commanded velocity. If the robot is commanded to stand, this may be the velocity to its
+    /// place instead. That is so if the robot was pushed out of its stance, or has not yet reached the place
+    /// to which commands moved it.
     fn velocity_to_place(
         &mut self,
         body: &BodyEstimate,
@@ -268,9 +269,9 @@ impl BalanceState {
         }
     }
 
-    /// Returns true if the left foot carries first. The foot nearer to the capture point does; if both are
-    /// equally near, it is the one that the robot turns away from. A robot that has lost its stance also
-    /// considers its spin: see [`SPIN_S_RAD`].
+    /// Returns true if the left foot is the first stance foot. This is the foot nearer to the capture point;
+    /// if both are equally near, it is the foot that the robot turns away from. A robot that has lost its
+    /// stance also considers its spin: see [`SPIN_S_RAD`].
     fn left_carries_first(&self, scale: &BodyScale, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
         let capture_m = stance.capture_m;
         if let Some(spin_rad_s) = lost_rad_s {
@@ -329,8 +330,8 @@ mod tests {
     use super::*;
     use crate::body::posed::Posed;
 
-    /// Returns true if the left foot carries first with the capture point here, and with this spin if
-    /// the stance was lost.
+    /// Returns true if the left foot is the first stance foot with the capture point here, and with this spin
+    /// if the stance was lost.
     fn left_carries(capture_m: [f32; 2], lost_rad_s: Option<f32>) -> bool {
         let body = Posed::standing().body();
         let state = BalanceState::new(&body);
@@ -340,8 +341,8 @@ mod tests {
         state.left_carries_first(&BodyScale::G1, &stance, lost_rad_s)
     }
 
-    /// A blow ahead or back at an elbow sets the robot spinning. It swings the leg that stops the spin,
-    /// though the other foot is a little nearer.
+    /// A forward or backward blow at an elbow sets the robot spinning. It swings the leg that stops the spin,
+    /// although the other foot is a little nearer to the capture point.
     #[test]
     fn a_robot_that_spins_steps_with_the_leg_that_stops_it() {
         for (ahead_m, spin_rad_s, left) in

@@ -1,4 +1,4 @@
-//! Observer of pushes: forces beside gravity and the commanded ground force.
+//! Observer of pushes: forces other than gravity and the commanded ground force.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -18,8 +18,8 @@ pub(super) const CALM: ObserverRates = ObserverRates {
     largest_change_m_s3: LARGEST_CHANGE_M_S3,
     largest_fall_m_s3: LARGEST_CHANGE_M_S3,
 };
-/// Rates for a robot that leans ahead of a pull. The end of a push is recognised sooner: a robot that
-/// goes on leaning against a pull that has ended falls.
+/// Rates for a robot that leans ahead of a pull. They recognise the end of a push sooner: a robot that
+/// continues to lean against a pull that has ended falls.
 pub(super) const QUICK: ObserverRates =
     ObserverRates { poles_1_s: 22.0, largest_change_m_s3: LARGEST_CHANGE_M_S3, largest_fall_m_s3: 9.0 };
 const LARGEST_PUSH_M_S2: f32 = 2.0;
@@ -34,9 +34,9 @@ pub(super) struct ObservedPush {
 
 /// A push split by its path into the robot.
 pub(super) struct SplitPush {
-    /// The horizontal part that does not come through hands with an object.
+    /// Horizontal part of the push that does not act through hands that hold an object.
     pub rest: ObservedPush,
-    /// The horizontal part through the hands that the robot withstands.
+    /// Horizontal part through the hands that the robot withstands.
     pub hands_m_s2: Vector,
     /// Height of the palms over the centre of mass.
     pub hands_lever_m: f32,
@@ -60,8 +60,8 @@ pub(super) struct PushObserver {
 }
 
 impl PushObserver {
-    /// Returns the push for a robot that leans ahead of pulls by the share `ahead`, combining the calm
-    /// estimate with that of `quick`.
+    /// Returns the push for a robot that leans ahead of pulls by the share `ahead`. It blends this estimate
+    /// with that of the faster observer `quick` by this share.
     pub(super) fn push_ahead(&self, quick: &PushObserver, ahead: f32) -> ObservedPush {
         let [calm, quick] = [self, quick].map(|observer| observer.push);
         let sooner_m_s2 = quick.acceleration_m_s2 - calm.acceleration_m_s2;
@@ -98,7 +98,7 @@ mod tests {
 
     const DT_S: f32 = 1.0 / 200.0;
 
-    /// Observes a body that is accelerated by the expected acceleration and an unannounced push.
+    /// Observes a body that is accelerated by the expected acceleration and an unexpected push.
     fn observe(
         rates: &ObserverRates,
         seconds: f32,

@@ -27,7 +27,7 @@ pub(super) use place::StandingPlace;
 /// Maximum distance of the centre of mass, loads included, from the middle of the feet before the pelvis
 /// shifts.
 const COM_ZONE_M: f32 = 0.0435;
-/// This distance for a robot that comes to rest after walking, which settles nearer to its present position.
+/// The same distance for a robot that comes to rest after walking. It settles nearer to its present position.
 const RESTING_ZONE_M: f32 = 0.01;
 /// Maximum distance of the balance point from the middle of the feet that the feet hold alone; the
 /// pelvis leans against the rest of a push. Hands that come down on a table push the robot back, and
@@ -56,9 +56,8 @@ const LEANING_TIME_S: f32 = 0.25;
 /// Zone of the centre of mass of a robot that holds an object with partners. It is smaller, because the feet
 /// have to hold the partners' pull.
 const HELD_ZONE_M: f32 = 0.028;
-/// Yielding to partners. Beyond this pull of a shared load on its hands, a robot moves along the pull.
-/// It moves at this rate per newton, while its centre of mass stays in a zone. So pulls between standing
-/// robots decay.
+/// Yielding to partners: minimum pull of a shared load on the hands at which a robot moves along the pull,
+/// and its speed per newton. Its centre of mass stays in a zone. So pulls between standing robots decay.
 const PULLED_N: f32 = 12.0;
 const GIVING_WAY_M_S_N: f32 = 0.002;
 const GIVING_WAY_ZONE_M: f32 = 0.035;
@@ -92,7 +91,8 @@ pub(super) struct Stand {
     /// Poses of the ankle roll links at planting, world.
     feet: Sides<Pose>,
     soles: Sides<Pose>,
-    /// Pelvis over the middle of the feet, and its remaining offset and velocity since planting.
+    /// Rest position of the pelvis; its remaining offset from there, and the rate of the offset, since
+    /// planting.
     home_m: Vector,
     offset_m: Vector,
     offset_rate_m_s: Vector,
@@ -109,16 +109,17 @@ pub(super) struct Stand {
 
 /// Rest posture of a robot that stepped.
 pub(super) struct Resting<'a> {
-    /// Pelvis over the middle of the soles, heading frame.
+    /// Pelvis relative to the middle of the soles, heading frame.
     pub rest_m: Vector,
-    /// True if the pelvis keeps to that position as in standing, rather than to the middle of the feet.
+    /// True if the pelvis keeps to `rest_m` as in standing, rather than to the middle of the feet.
     pub keeps: bool,
     /// Load against which the robot leans.
     pub load: &'a Load,
 }
 
 impl Stand {
-    /// Plants the feet where they are. `None` keeps the pelvis where it is.
+    /// Plants the feet at their present poses. If `moving` is `None`, the pelvis stays at its present
+    /// position.
     pub(super) fn plant(body: &BodyEstimate, heading_rad: f32, moving: Option<Resting>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = body.world_from_soles();
@@ -149,8 +150,8 @@ impl Stand {
             stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             if keeps {
-                // The centre of mass of a robot that has stepped is farther ahead of its pelvis than
-                // once it is upright: it shifts as the robot straightens.
+                // The centre of mass of a robot that has stepped is farther ahead of its pelvis than that of
+                // an upright robot. It shifts as the robot straightens.
                 stand.home_m -= shift_m;
             }
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
@@ -158,15 +159,15 @@ impl Stand {
         stand
     }
 
-    /// Returns the centre of mass, loads included, for a pelvis at home: from the middle of the feet, in
-    /// the heading frame.
+    /// Returns the centre of mass, loads included, for a pelvis at its rest position. It is relative to the
+    /// middle of the feet, in the heading frame.
     fn weights_m(&self, body: &BodyEstimate, load: &Load) -> Vector {
         let away_m = load.weights_point_m - body.world_from_pelvis().translation;
         Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - middle_m(&self.soles))
     }
 
-    /// Returns the shift of the pelvis against the part of a push that the feet do not hold, with the
-    /// centre of mass at `weights_m`; all in the heading frame, from the middle of the feet.
+    /// Returns the shift of the pelvis against the part of a push that the feet do not hold, with the centre
+    /// of mass at `weights_m`. Both are in the heading frame, relative to the middle of the feet.
     fn against_push_m(&self, scale: &BodyScale, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
         let coming_m = (load.balance_point_m_s * scale.time_s(LEAD_S))
@@ -223,8 +224,8 @@ impl Stand {
         (legs, flat(push_n / body.model.mass_kg))
     }
 
-    /// Returns the pelvis goal (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle
-    /// of the planted feet, as near to home as that and a push allow.
+    /// Returns the pelvis goal (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of
+    /// the planted feet. It is as near to the rest position as this and a push allow.
     fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> PelvisGoal {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
@@ -245,8 +246,8 @@ impl Stand {
         }
     }
 
-    /// Returns the displacement, in one physics step, of a robot that yields to its partners along the
-    /// pull on its hands, with the centre of mass at `weights_m`; all in the heading frame.
+    /// Returns the displacement, in one physics step, of a robot that yields to its partners along the pull
+    /// on its hands. `weights_m` is its centre of mass. Both are in the heading frame.
     fn giving_way_m(&self, body: &BodyEstimate, load: &Load, weights_m: Vector, dt_s: f32) -> Vector {
         let scale = &body.model.scale;
         let pull_n = flat(body.hand_reaction_n.left + body.hand_reaction_n.right);
@@ -421,7 +422,7 @@ mod tests {
         assert_eq!(lean_m(0.0, 0.1, 1.45), 0.0);
     }
 
-    /// While a hand holds something, the lean follows with a delay, and its prediction has no effect.
+    /// While a hand holds an object, the lean follows with a delay, and its prediction has no effect.
     #[test]
     fn a_robot_that_holds_something_leans_as_far_as_it_is_pushed_now() {
         let mut stand = Stand::plant(&Posed::standing().body(), 0.0, None);

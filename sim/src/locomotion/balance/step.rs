@@ -1,15 +1,16 @@
 //! Stepping: one foot carries the robot, the other swings to the foothold that the capture point requires.
 //!
-//! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w =
-//! sqrt(g / h), the capture point  xi = x + (v - s u) / w  obeys
+//! With x the balance point, v its velocity, u the velocity of the swinging foot, s = [`SWING_INERTIA`] and w
+//! = sqrt(g / h), the capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p) + s u,   p the centre of pressure,
 //! which moves from the old foot to the new one within the transfer time and stays there. The remaining
 //! contribution of s u until the foot lands is part of the steady gait's offset b. The plan of a step ignores
 //! it: including it brought no gain. A foot put down at xi(T) - b  leaves the capture point the offset b from
 //! the new foot; see [`Gait`]. The centre of mass moves along with a leg that swings, and stops with it: v -
-//! s u is the speed that lasts, known from the angular momentum about the ground. Without it a robot that was
-//! hit steps too far, the farther the faster it steps, and at the next step too far the other way. Source:
-//! Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
+//! s u is the lasting velocity, as given by the angular momentum about the ground. Without this term a robot
+//! that was hit steps too far. The faster it steps, the larger is the error, and the next step is too far the
+//! other way.
+//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -29,8 +30,8 @@ use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
 /// Distance between the capture point and its position at the end of a step, below which the first foot
-/// lifts. It also lifts if a robot that falls forward or backward beyond the second distance has no time
-/// to shift.
+/// lifts. If a robot falls forward or backward beyond the second distance, there is no time to shift, and the
+/// foot also lifts.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
 /// Maximum duration of the shift. A robot that leans against partners would otherwise shift forever:
@@ -49,7 +50,7 @@ const RETURN_RAD_S: f32 = 0.4;
 const SWAYING_RAD_S: f32 = 1.0;
 const LARGEST_SPIN_TURN_RAD: f32 = 0.8;
 /// Velocity error that indicates a blow. The robot then steps to come to a stand, not to walk on. Tuned on
-/// the same punches.
+/// the same punches as the spin.
 const STRAYING_M_S: f32 = 0.6;
 /// Averaging time of the pelvis's facing direction. The pelvis sways about the vertical with every step.
 const FACING_TIME_S: f32 = 0.2;
@@ -129,7 +130,8 @@ impl Stepping {
         step
     }
 
-    /// Returns the angle between the heading and the one to which the commands alone would have turned it.
+    /// Returns the angle between the heading and the heading to which the commands alone would have turned
+    /// the robot.
     pub(super) fn to_turn_rad(&self) -> f32 {
         wrapped_rad(self.goal_rad - self.heading_rad).abs()
     }
@@ -143,7 +145,7 @@ impl Stepping {
         self.time_s == 0.0 && self.shifting_s.is_none()
     }
 
-    /// Runs one physics step. It also returns the expected horizontal acceleration of the centre of mass.
+    /// Runs one physics step. Also returns the expected horizontal acceleration of the centre of mass.
     pub(super) fn tick(
         &mut self,
         body: &BodyEstimate,
@@ -223,8 +225,8 @@ impl Stepping {
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
     }
 
-    /// Returns the axes ahead and left at the landing of the swinging foot, for a robot that was set
-    /// spinning; otherwise those of its heading.
+    /// Returns the axes ahead and left at the landing of the swinging foot for a robot that was set spinning.
+    /// For other robots it returns the axes of the heading.
     fn landing_axes(&self, body: &BodyEstimate, yaw_rate_rad_s: f32) -> [Vector; 2] {
         let scale = &body.model.scale;
         let swaying_rad_s = scale.rate_1_s(SWAYING_RAD_S);
@@ -283,7 +285,7 @@ impl Stepping {
         height_m(Side::Left).min(height_m(Side::Right))
     }
 
-    /// Exchanges the feet when the swinging one has met the ground.
+    /// Swaps stance foot and swing foot when the swing foot has met the ground.
     fn land(&mut self, body: &BodyEstimate, soles: &Sides<Pose>, ground_m: f32) {
         let swinging_s = self.time_s - TRANSFER_S;
         let swing = self.stance.other();
@@ -355,8 +357,8 @@ fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
     })
 }
 
-/// Returns the required capture point at lift-off of the first foot, as a step that just ended would
-/// leave it, and true if the foot lifts now.
+/// Returns the required capture point at lift-off of the first foot, as a step that just ended would leave
+/// it. Also returns true if the foot lifts now.
 fn shift(now: &FootstepInputs) -> (Vector, bool) {
     let scale = now.scale;
     let target_m = now.steady_capture_m(scale.time_s(SWING_S));

@@ -14,7 +14,7 @@ pub(super) const SWING_S: f32 = 0.25;
 /// Time in the air: the foot is down a little before the step ends.
 pub(super) const AIR_S: f32 = 0.93 * SWING_S;
 const HEIGHT_M: f32 = 0.044;
-/// Downward speed of a foot that has not met the ground.
+/// Downward speed of a foot that has not yet met the ground.
 const PROBING_M_S: f32 = 0.25;
 /// Remaining time below which the goal is fixed.
 const MIN_REMAINING_S: f32 = 0.03;
@@ -38,7 +38,7 @@ pub(super) struct Swing {
 }
 
 impl Swing {
-    /// Plants the foot; its next swing starts from there.
+    /// Plants the foot; its next swing starts from the present pose.
     pub(super) fn plant(&mut self, body: &BodyEstimate, side: Side) {
         *self = Swing::at(body.world_from_foot(side));
     }
@@ -70,9 +70,9 @@ impl Swing {
         self.position_m += self.velocity_m_s * dt_s;
     }
 
-    /// Returns the place nearest to `sole_m` where the sole can come to rest in time. Without further
-    /// jerk a foot stops at
-    ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of the minimum-jerk path is zero.
+    /// Returns the point nearest to `sole_m` where the sole can come to rest in time. The minimum-jerk path
+    /// starts without jerk if it ends at
+    ///   x + 0.6 v T + 0.15 a T^2.
     pub(super) fn reachable_m(&self, scale: &BodyScale, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
         let remaining_s = ((AIR_S - time_s) / pace).max(0.0);
         let resting_m = self.sole_m(scale)
@@ -119,7 +119,7 @@ impl Swing {
 
 /// Returns the height over the path along the ground, `time_s` after lift-off, with its first and second
 /// derivative:
-///   16 h p^2 (1 - p)^2,   p = t / T;   after T down, until something is met.
+///   16 h p^2 (1 - p)^2,   p = t / T;   after T downward, until the foot meets the ground.
 fn lift(time_s: f32) -> [f32; 3] {
     if time_s > AIR_S {
         return [PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0];

@@ -1,5 +1,5 @@
-//! Notes on meshes that are not convex: they collide as their hulls, as in MuJoCo, but have other masses
-//! than in MuJoCo.
+//! Notes on meshes that are not convex. They collide as their hulls, as in MuJoCo, but their masses differ
+//! from MuJoCo's.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ const CONVEX_SHARE: f32 = 0.95;
 const HOLLOW_SHARE: f32 = 0.6;
 
 impl Document {
-    /// Notes meshes that are far from convex and collide or have mass as their hulls. There is one note of
-    /// each kind, with the first mesh.
+    /// Adds notes on meshes that are far from convex but whose hulls collide or have mass. There is one note
+    /// of each kind, with the first mesh.
     pub(in crate::mjcf) fn note_concave_meshes(&mut self) {
         let (mut weighing, mut hollow) = (Vec::new(), Vec::new());
         let mut shares: BTreeMap<&str, f32> = BTreeMap::new();

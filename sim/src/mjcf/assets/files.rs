@@ -48,8 +48,8 @@ impl PartialEq for Mesh {
     }
 }
 
-/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states, and data that only images
-/// use.
+/// Input of the fingerprint. It omits `weighs_exactly`, which is an attribute of the asset, and data that
+/// only images use.
 impl fmt::Debug for Mesh {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Mesh { vertices_m, triangles, .. } = self;
@@ -211,8 +211,8 @@ fn read_obj(path: &Path, mut bytes: &[u8]) -> Result<Mesh, SimError> {
     Ok(found)
 }
 
-/// Returns a property of the corners of all triangles, given by indices into values of `N` numbers; empty
-/// if no model has it, and zero for models without it.
+/// Returns a property of the corners of all triangles, given by indices into values of `N` numbers. Returns
+/// an empty vector if no model has the property. Models without it get zero.
 fn corners<T: Copy + Default, const N: usize>(
     models: &[tobj::Model],
     of: fn(&tobj::Mesh) -> (&Vec<u32>, &Vec<f32>),
@@ -286,7 +286,8 @@ fn read_msh(bytes: &[u8]) -> Option<Mesh> {
     })
 }
 
-/// Returns values of vertices for the corners of triangles; empty unless each vertex has one.
+/// Returns values of vertices for the corners of triangles. Returns an empty vector unless each vertex has a
+/// value.
 fn of_corners<T: Copy>(triangles: &[[u32; 3]], values: &[T], vertices: usize) -> Vec<[T; 3]> {
     if values.len() != vertices {
         return Vec::new();
@@ -294,7 +295,7 @@ fn of_corners<T: Copy>(triangles: &[[u32; 3]], values: &[T], vertices: usize) ->
     triangles.iter().map(|corners| corners.map(|corner| values[corner as usize])).collect()
 }
 
-/// Reads a little-endian number of four bytes; `None` beyond the end.
+/// Reads a little-endian number of four bytes. Returns `None` beyond the end.
 fn number(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
 }
@@ -304,7 +305,7 @@ mod tests {
     use super::*;
     use crate::mjcf::Primitive;
 
-    /// A unit square of two triangles, and one side of a tent over it.
+    /// A unit square of two triangles, and one slope of a tent over it.
     const OBJ: &str =
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 1\nvn 0 0 1\nf 4//1 3//1 2//1 1//1\nf -5 -4 -1\n";
     const STL: &str = "solid tent\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid tent\n";
@@ -334,7 +335,7 @@ mod tests {
         assert_eq!(corners_m, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 1.0]].map(Vector::from));
 
         let mesh = read_geom("tent.STL", STL, r#"scale="1 1 -1""#).expect("an STL file");
-        // The reflection keeps the outside outside.
+        // The reflection preserves the outside.
         assert_eq!((mesh.vertices_m.len(), mesh.triangles.as_slice()), (3, [[0, 2, 1]].as_slice()));
     }
 
@@ -365,7 +366,7 @@ mod tests {
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.25\nvt 1 0\nvn 0 0 2\nvn 0 2 2\n\
             f 1/1/1 2/2/1 3/1/2\n";
         let mesh = read_geom("tent.obj", obj, r#"scale="1 2 -1""#).expect("an OBJ file");
-        // The reflection swaps two corners. Rows of an image go down.
+        // The reflection swaps two corners. Rows of an image are counted downwards.
         assert_eq!(mesh.corner_uv, [[[0.25, 0.75], [0.25, 0.75], [1.0, 1.0]]]);
         let slanted = Vector::new(0.0, 0.5, -1.0).normalize();
         let [first, second, third] = mesh.corner_normal[0];

@@ -6,18 +6,18 @@ use crate::SimError;
 use crate::mjcf::text::source::MjcfText;
 use crate::mjcf::text::stated::Classes;
 
-/// Emission and reflection of a material, in the meaning of MuJoCo's renderer.
+/// Emission and reflection of a material, as MuJoCo's renderer defines them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gloss {
-    /// Light that the surface emits, as a multiple of its colour, or of the light of its layer.
+    /// Emitted light as a multiple of the surface's colour, or of its layer of emitted light.
     pub emission_factor: f32,
     /// Strength of highlights.
     pub specular_factor: f32,
-    /// Sharpness of highlights: their exponent is 128 times it.
+    /// Sharpness of highlights; their exponent is 128 times this factor.
     pub shininess_factor: f32,
-    /// Roughness of a surface that states it; its square is the width of the distribution of facets (GGX).
+    /// Roughness, if the material gives it. Its square is the width of the facets' distribution (GGX).
     pub roughness_factor: Option<f32>,
-    /// Share of the surface that reflects as metal does, in its own colour.
+    /// Share of the surface that reflects like metal, in the surface's colour.
     pub metallic_factor: f32,
     /// Share of ambient light that reaches the surface.
     pub ambient_factor: f32,
@@ -51,8 +51,9 @@ pub const SHININESS: f32 = 128.0;
 pub const USUAL_EXPONENT: f32 = 64.0;
 
 impl Gloss {
-    /// Returns the gloss with the highlights of a roughness: the exponent of as wide a distribution, and a
-    /// strength that keeps their light. Source: Walter et al. 2007, section 5.2 (exponent of Phong's facets).
+    /// Returns the gloss with highlights for a roughness: an exponent for a distribution of the same width,
+    /// and a strength that preserves their light. Source: Walter et al. 2007, section 5.2 (exponent of
+    /// Phong's facets).
     #[inline(always)]
     pub fn as_rough_as(self, roughness_factor: f32) -> Gloss {
         let width = roughness_factor.clamp(MIN_ROUGHNESS, 1.0) * roughness_factor.clamp(MIN_ROUGHNESS, 1.0);
@@ -65,8 +66,8 @@ impl Gloss {
         }
     }
 
-    /// Returns the gloss at a texel of a layer, whose numbers are the share of ambient light, roughness and the
-    /// metallic share.
+    /// Returns the gloss at a texel of a layer, whose numbers are the share of ambient light, the roughness
+    /// and the metallic share.
     #[inline(always)]
     pub fn at_texel(self, [ambient_factor, roughness_share, metallic_share]: [f32; 3]) -> Gloss {
         let here = Gloss { metallic_factor: self.metallic_factor * metallic_share, ambient_factor, ..self };
@@ -107,7 +108,7 @@ impl Glosses {
                 ..usual
             };
             let gloss = match gloss.roughness_factor {
-                // Layers give it point by point.
+                // A layer determines the roughness point by point.
                 Some(roughness) if !has_numbers && stated("shininess").is_none() => {
                     gloss.as_rough_as(roughness)
                 }

@@ -19,7 +19,7 @@ struct KeptDocument {
     document: Document,
 }
 
-/// Returns the cached document of a file, if none of its files has changed since.
+/// Returns the cached document of a file, if none of its files has changed since it was read.
 pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
     // Every call leaves the cache consistent, so a poisoned lock is safe to use.
     let kept = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);

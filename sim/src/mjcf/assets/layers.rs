@@ -10,7 +10,7 @@ use super::texture::{TexelMeaning, Texture};
 use crate::SimError;
 use crate::mjcf::Document;
 
-/// Roles of textures that determine the places of a material's images. The first role that the material has
+/// Roles of textures that determine the mapping of a material's images. The first role that the material has
 /// counts.
 const PLACING: [&str; 9] =
     ["rgb", "rgba", "orm", "roughness", "metallic", "normal", "opacity", "emissive", "occlusion"];
@@ -24,7 +24,7 @@ pub(in crate::mjcf) struct Layers(BTreeMap<String, MaterialLayers>);
 pub(in crate::mjcf) struct MaterialLayers {
     /// Names of the textures, by role.
     named: BTreeMap<String, String>,
-    /// Colour, white without a layer for it, and opacity.
+    /// Colour, white without a colour layer, and opacity.
     colour: Arc<Texture>,
     /// Share of ambient light in the first channel, roughness in the second, metallic share in the third.
     pub gloss: Option<Arc<Texture>>,
@@ -35,7 +35,7 @@ pub(in crate::mjcf) struct MaterialLayers {
 }
 
 impl MaterialLayers {
-    /// Returns the name of the texture that places the images.
+    /// Returns the name of the texture that determines the mapping of the images.
     pub fn placing(&self) -> Option<&str> {
         PLACING.iter().find_map(|role| self.named.get(*role)).map(String::as_str)
     }
@@ -53,7 +53,7 @@ impl Layers {
 }
 
 impl Document {
-    /// Puts the images of layers together, and notes those that are not drawn.
+    /// Combines the layers into images, and notes layers that are not drawn.
     pub(in crate::mjcf) fn read_layers(&mut self) -> Result<(), SimError> {
         let (mut found, mut notes) = (BTreeMap::new(), Vec::new());
         let xml = self.source.xml()?;

@@ -19,7 +19,8 @@ pub struct SurfaceImage {
     /// Numbers at the same places: share of ambient light in the first channel, roughness in the second,
     /// metallic share in the third.
     pub gloss: Option<Arc<Texture>>,
-    /// Normals at the same places in the frame of the surface, each 0 to 1 for -1 to 1; the second is upwards.
+    /// Normals at the same places in the frame of the surface, each 0 to 1 for -1 to 1. The second axis
+    /// points up in the image.
     pub relief: Option<Arc<Texture>>,
     /// Emitted light at the same places.
     pub emitted: Option<Arc<Texture>>,
@@ -44,7 +45,7 @@ pub(in crate::mjcf) struct MappedShape {
     pub half_m: Vector,
     pub centre_m: Vector,
     pub is_mesh: bool,
-    /// True if its corners have texture coordinates.
+    /// True if the mesh's corners have texture coordinates.
     pub has_uv: bool,
 }
 
@@ -94,7 +95,7 @@ impl TextureRepeats {
 }
 
 impl SurfaceImage {
-    /// Returns the image of a material on a shape; `None` if its texture has none.
+    /// Returns the image of a material on a shape. Returns `None` if the material's texture has no image.
     pub(in crate::mjcf) fn of(
         document: &Document,
         material: &mjcf_rs::assets::Material,
@@ -105,7 +106,7 @@ impl SurfaceImage {
         let relief = layers.and_then(|layers| layers.relief.clone());
         let emitted = layers.and_then(|layers| layers.emitted.clone());
         let has_layers = gloss.is_some() || relief.is_some() || emitted.is_some();
-        // A single texel is a plain colour, which the geom has.
+        // A single texel is a plain colour, which the geom already has.
         let is_image = |texture: &&Arc<Texture>| texture.levels[0].texels.len() > 1 || has_layers;
         let texture = document.colour_of(material).filter(is_image)?.clone();
         let name = layers.map_or(material.texture.as_deref(), |layers| layers.placing())?;
@@ -135,7 +136,7 @@ fn along(TextureRepeat { repeats_factor, is_uniform }: TextureRepeat, shape: &Ma
 
 fn cube(TextureRepeat { is_uniform, .. }: TextureRepeat, shape: &MappedShape) -> TextureMapping {
     let MappedShape { half_m, centre_m, .. } = *shape;
-    // MuJoCo scales its own shapes to a cube, and meshes only if they are to be uniform.
+    // MuJoCo scales a cube to its own shapes, and to meshes only if their textures are uniform.
     let scale_1_m = match (shape.is_mesh, is_uniform) {
         (false, false) => 1.0 / half_m.max(Vector::splat(f32::EPSILON)),
         (true, true) => half_m,

@@ -1,13 +1,13 @@
 //! Images of textures: reduced to powers of two, with mip levels down to one texel. A cube may have six
-//! images, one a face.
+//! images, one per face.
 
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Pixel, Rgb, RgbImage, RgbaImage};
 
-/// Maximum width and height of a kept image. The cameras of robots show no more of a surface.
+/// Maximum width and height of a stored image. Robots' cameras resolve no finer detail of a surface.
 const MAX_SIDE: u32 = 1024;
 
-/// Image of a texture, or the six of a cube, at their size and halved again and again down to one texel.
+/// Image of a texture, or the six images of a cube, with mip levels down to one texel.
 #[derive(PartialEq)]
 pub struct Texture {
     /// Never empty; the largest level first. Sides are powers of two.
@@ -28,8 +28,8 @@ pub struct TextureLevel {
     pub height: usize,
     /// The same width and height as floating-point numbers.
     pub size_px: [f32; 2],
-    /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six
-    /// images, all of them in the order +x, -x, +y, -y, +z, -z.
+    /// sRGB and alpha, row by row from the top left. Without alpha, the fourth byte is 0. A cube has its six
+    /// images in the order +x, -x, +y, -y, +z, -z.
     pub texels: Vec<[u8; 4]>,
 }
 
@@ -50,8 +50,8 @@ impl std::fmt::Debug for Texture {
 }
 
 impl Texture {
-    /// Reduces an image of at least one pixel, or the six of a cube, to its levels. All get the size of the
-    /// largest.
+    /// Reduces an image of at least one pixel, or the six images of a cube, to its levels. All images get the
+    /// size of the largest.
     pub(in crate::mjcf) fn of(images: &[RgbImage]) -> Texture {
         Texture::reduced(images, false)
     }
@@ -82,8 +82,8 @@ impl Texture {
         Texture::of(&[RgbImage::from_pixel(1, 1, Rgb(rgb))])
     }
 
-    /// Puts channels of images of one face together, at the size of the largest. A channel without an image
-    /// is full.
+    /// Combines channels from images of one face, at the size of the largest image. A channel without an
+    /// image has the maximum value.
     pub(in crate::mjcf) fn of_channels(
         channels: [Option<(&Texture, usize)>; 4],
         meaning: TexelMeaning,
@@ -106,13 +106,13 @@ impl Texture {
         Texture { levels: levels(whole, meaning), mean_rgb, has_alpha: meaning == TexelMeaning::Light }
     }
 
-    /// Returns the number of images: 1, or 6 for a cube with one a face.
+    /// Returns the number of images: 1, or 6 for a cube with one per face.
     pub fn images(&self) -> usize {
         self.levels[0].texels.len() / self.levels[0].image_texels()
     }
 }
 
-/// Returns a level and those of half its size, down to one texel.
+/// Returns a level and all smaller ones, each of half the size, down to one texel.
 fn levels(whole: TextureLevel, meaning: TexelMeaning) -> Vec<TextureLevel> {
     let mut levels = vec![whole];
     while let Some(half) = levels.last().and_then(|level| level.halved(meaning)) {
@@ -144,8 +144,8 @@ impl TextureLevel {
         self.width * self.height
     }
 
-    /// Returns the level of half the size; `None` if an image has a single texel. A texel has the mean of those
-    /// that it replaces; of light, by a gamma of 2.
+    /// Returns the level of half the size. Returns `None` if an image has a single texel. A texel is the mean
+    /// of those that it replaces; for light, the mean uses a gamma of 2.
     fn halved(&self, meaning: TexelMeaning) -> Option<TextureLevel> {
         let images = self.texels.len() / self.image_texels();
         if self.image_texels() == 1 {
@@ -189,7 +189,7 @@ fn mean_rgb<P: Pixel<Subpixel = u8>>(images: &[ImageBuffer<P, Vec<u8>>]) -> [f32
             }
         }
         let pixels = image.pixels().len().max(1);
-        // Each image is as large as the others on the cube.
+        // Every image has the same area on the cube.
         sum = std::array::from_fn(|i| sum[i] + sum_of_image[i] / pixels as f64);
         count += 1;
     }

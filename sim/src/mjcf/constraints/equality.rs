@@ -8,7 +8,7 @@ use crate::mjcf::Document;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EqualityConstraint {
-    /// Name in the file; empty if it gives none.
+    /// Name in the file; empty if there is none.
     pub name: String,
     /// True if the constraint holds from the beginning.
     pub active: bool,

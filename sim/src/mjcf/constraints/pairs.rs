@@ -54,7 +54,7 @@ impl GeomPair {
         let at = |index: usize| stated.get(index).copied().unwrap_or(FRICTION[index]);
         Ok(GeomPair {
             geoms: [geom("geom1")?, geom("geom2")?],
-            // Friction is the same along both tangents here.
+            // Friction here is the same along both tangents.
             friction: Friction {
                 directions: condim.and_then(Directions::from_condim).unwrap_or(Directions::Slide),
                 slide: at(0).max(at(1)),

@@ -6,7 +6,7 @@ use super::{
 };
 
 const TREE: &[&str] = &["worldbody", "body", "frame"];
-/// Elements that contain bodies and their parts, or defaults of these.
+/// Elements that contain bodies and their parts, or defaults for them.
 const TREE_OR_DEFAULT: &[&str] = &["worldbody", "body", "frame", "default"];
 
 pub(super) const ELEMENTS: &[Element] = &[

@@ -16,11 +16,11 @@ pub(super) enum Support {
     Approximated,
     /// It has no effect on motion or on the drawn image.
     Ignored,
-    /// A file that has it is not read. A value in [`Takes::Only`] is the actual behaviour, and accepted.
+    /// A file with it is refused. A value in [`Takes::Only`] is the actual behaviour, and accepted.
     Refused,
 }
 
-/// An element by its name and the elements that may contain it.
+/// Element, given by its name and the elements that may contain it.
 pub(super) struct Element {
     pub name: &'static str,
     pub within: &'static [&'static str],
@@ -64,7 +64,7 @@ pub(super) enum Takes {
     Class,
     /// The name of an element of this kind.
     NameOf(&'static str),
-    /// One of these values; others are approximated or refused.
+    /// One of these values. Other values are approximated or refused.
     Only(&'static [&'static str]),
 }
 
@@ -75,7 +75,7 @@ pub(super) enum Sign {
     Positive,
 }
 
-/// Returns the entry of an element within another.
+/// Returns the entry of an element inside another.
 pub(super) fn element(within: &str, name: &str) -> Option<&'static Element> {
     all().find(|element| element.name == name && element.within.contains(&within))
 }

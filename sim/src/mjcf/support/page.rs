@@ -6,32 +6,34 @@ const PAGE: &str = concat!(env!("TANDEM_SIM_ASSETS"), "/../../docs/src/mjcf.md")
 
 const INTRODUCTION: &str = "# MJCF support
 
-Robots, scenes and objects are written in MJCF, MuJoCo's XML format, and one reader reads them all. It accepts or refuses
-every element and every attribute by the table below; nothing is dropped silently. The table is a part of the program
-(`sim/src/mjcf/support`), and a test keeps this page equal to it.
+Robots, scenes and objects are written in MJCF, MuJoCo's XML format, and the same reader parses all of them. It accepts
+or refuses every element and every attribute by the table below; nothing is dropped silently. The table is a part of
+the program (`sim/src/mjcf/support`), and a test keeps this page equal to it.
 
-* **mapped**: it does what it does in MuJoCo.
-* **approximated**: something like it happens, as the note says. The first place of each kind is named in the log when a
-  scene is read.
-* **ignored**: it has no effect on motion here, nor on what is drawn.
-* **refused**: a file that has it is not read. The message names file, line and the nearest element that has a name, and says
-  what to write instead, for all that is refused of a file at once. Where the table gives values, those are what happens
-  anyway, and accepted. [`tandem import`](scenes.md#files-of-other-programs) writes such files in what is read.
+* **mapped**: it has the same effect as in MuJoCo.
+* **approximated**: it has a similar effect, which the note describes. When a scene is read, the log names the first
+  occurrence of each kind.
+* **ignored**: it affects neither motion nor images.
+* **refused**: a file that contains it is not read. The message lists all refused parts of a file at once. It names
+  file, line and the nearest named element, and says what to write instead. Values in the table are accepted, since
+  they describe what happens anyway. [`tandem import`](scenes.md#files-of-other-programs) converts refused files to
+  supported MJCF.
 
-Whatever is not in the table is refused too: a misspelt attribute, or one that a newer MuJoCo has. So are
+Everything that is not in the table is refused, too, for example a misspelt attribute, or one of a newer MuJoCo. So are
 
 * numbers that are not finite, too many or too few; masses below 0; quaternions of 0; two rotations on one element;
-* a name that two elements of a kind have, and a class, material or texture that is not in the file;
-* a `<compiler>` after a `<default>` that states angles, which it would change in MuJoCo;
+* a name that two elements of one kind share, and a class, material or texture that is not in the file;
+* a `<compiler>` after a `<default>` with angles, whose meaning it would change in MuJoCo;
 * ranges whose smaller number comes second, `limited=\"true\"` without a range, and a range with neither `limited` nor
   `autolimits`;
-* joints that move nothing that has mass, and shapes with an extent of 0;
-* more than 200 elements inside one another.
+* joints that move no mass, and shapes with an extent of 0;
+* more than 200 levels of nested elements.
 
-A robot's file has one free body with all others on it, hinges with one `<position>` actuator each, called as the published
-joints, sites `left_wrist`, `right_wrist`, `left_foot` and `right_foot`, a camera `egocentric` and a `<keyframe>` whose first
-key it stands in; waist, arms and hands may lack joints. Of files that are otherwise, [a description](robots.md) says what is
-what. An object's file has one body in the worldbody, and neither actuators nor keys.
+A robot's file has one free body that carries all others, and hinges with the names of the published joints and one
+`<position>` actuator each; waist, arms and hands may lack joints. It has sites `left_wrist`, `right_wrist`, `left_foot`
+and `right_foot`, a camera `egocentric`, and a `<keyframe>` whose first key is a standing pose. For other files, [a
+description](robots.md) assigns their parts. An object's file has one body in the worldbody, and neither actuators nor
+keys.
 
 Angles are degrees unless `<compiler angle=\"radian\"/>` says otherwise, as in MuJoCo.
 

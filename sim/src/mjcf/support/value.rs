@@ -2,7 +2,7 @@
 
 use super::{Sign, Takes};
 
-/// Returns the accepted form of an attribute's value, or `None` if the value is accepted.
+/// Returns a description of the accepted values, or `None` if the value is accepted.
 pub(in crate::mjcf) fn wanted(value: &str, takes: Takes) -> Option<String> {
     let (right, wanted) = match takes {
         Takes::Text | Takes::Class | Takes::NameOf(_) => return None,

@@ -1,4 +1,4 @@
-//! Trees, equalities and actuators of small files.
+//! Tests of trees, equalities and actuators of small files.
 
 mod refusals;
 
@@ -63,7 +63,7 @@ fn bodies_without_a_joint_belong_to_the_link_that_carries_them() {
     let leaf = &trees[1].links[1];
     assert_eq!(leaf.bodies[1].name, "plate");
     assert_eq!(leaf.bodies[1].link_from_body.translation, DVec3::new(0.7, 0.0, 0.0));
-    // The plate is turned by half a turn, so its x is the leaf's -x.
+    // The plate is rotated by half a turn, so its x axis is the leaf's -x.
     assert!((leaf.sites[0].position_m().x - 0.6).abs() < 1e-6);
     let bolt = &trees[1].links[2];
     assert!((bolt.parent_from_link.translation - DVec3::new(0.65, 0.0, 0.0)).length() < 1e-9);
@@ -376,9 +376,9 @@ fn included_files_keep_their_lines_and_are_read_once() {
     assert!(error.contains("root.xml:1`: an included file is no <include> itself"), "{error}");
 }
 
-/// A joint's own limit of effort applies together with its actuators'. A position actuator may inherit
-/// its commands' range from the joint. The attribute may be on the element, or on a class that it has or
-/// inherits.
+/// The effort limit of a joint applies together with that of its actuators. A position actuator may inherit
+/// its control range from the joint. The attribute may be on the element, on its class, or on a class around
+/// that one.
 #[test]
 fn limits_are_those_of_joint_and_actuator_together() {
     let found = document(

@@ -1,4 +1,4 @@
-//! Errors of files that are refused.
+//! Errors for refused files.
 
 use crate::mjcf::Document;
 

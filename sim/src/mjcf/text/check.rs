@@ -16,9 +16,9 @@ const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "
 /// Findings about a file whose elements were all accepted.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct Checked {
-    /// Elements that differ slightly from MuJoCo, each with the first line that has it.
+    /// Elements that differ slightly from MuJoCo, each with the first line that contains it.
     pub approximated: Vec<String>,
-    /// Bodies in the order of `mjcf-rs`: the world, then every body before those on it.
+    /// Bodies in the order of `mjcf-rs`: the world first, and every body before the bodies it carries.
     pub bodies: Vec<BodyBytes>,
 }
 
@@ -102,7 +102,7 @@ impl Check<'_> {
     }
 
     /// Refuses settings after a class with angles. Here the angles of a class are read with the settings
-    /// before it; in MuJoCo all settings come first.
+    /// before it. In MuJoCo all settings are read first.
     fn check_angles(&mut self, root: &Node) {
         let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
         let mut sections =
@@ -235,7 +235,7 @@ impl Check<'_> {
         };
         let wanted = match takes {
             Takes::Class if !known(attribute.value()) => Some("the class of a <default>".to_string()),
-            // In an unused class it does not matter which name an attribute has.
+            // In an unused class, the name in an attribute does not matter.
             Takes::NameOf(_) if node.parent_element().is_some_and(|parent| is_default(&parent)) => None,
             Takes::NameOf("mesh") => None,
             Takes::NameOf(kind) if !known(attribute.value()) => Some(format!("the name of a {kind}")),

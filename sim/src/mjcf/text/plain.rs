@@ -1,4 +1,4 @@
-//! Default classes with the semantics of MuJoCo, where those of `mjcf-rs` differ: attributes that an element
+//! Default classes with the semantics of MuJoCo, where those of `mjcf-rs` differ. Attributes that an element
 //! inherits in part are written on the element.
 
 use std::ops::Range;
@@ -13,7 +13,7 @@ const ACTUATORS: [&str; 6] = ["general", "motor", "position", "velocity", "intve
 const SHARED: [&str; 5] = ["ctrlrange", "forcerange", "ctrllimited", "forcelimited", "gear"];
 /// Attributes that give a rotation; an element has at most one.
 const ROTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
-/// Attributes with several numbers. An element may state only the first of them.
+/// Attributes with several numbers, of which an element may state only the first ones.
 const LISTS: [&str; 2] = ["size", "friction"];
 
 /// Range of the text and its replacement.
@@ -32,7 +32,7 @@ pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
                 add_pose(&levels, &mut edits);
                 LISTS.iter().for_each(|list| add_list(&levels, list, &mut edits));
             }
-            // `mjcf-rs` takes only true and false.
+            // `mjcf-rs` accepts only true and false.
             "body" => edits.extend(node.attribute_node("sleep").map(|sleep| (sleep.range(), String::new()))),
             "general" | "motor" | "position" if within("actuator") => add_shared(&node, &classes, &mut edits),
             _ => {}
@@ -48,8 +48,7 @@ pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
     plain + &text[from..]
 }
 
-/// Returns the elements that state attributes for this one: itself, then those of its classes, the nearest
-/// first.
+/// Returns the elements that supply attributes for this one: itself, then its classes, the nearest first.
 fn levels<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>) -> Vec<Node<'a, 'i>> {
     let of_class = |class: Node<'a, 'i>| {
         let name = node.tag_name();
@@ -58,7 +57,7 @@ fn levels<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>) -> Vec<Nod
     std::iter::once(*node).chain(classes.of_element(node).into_iter().flat_map(of_class)).collect()
 }
 
-/// Adds position and rotation, each from the nearest level that states it.
+/// Adds position and rotation, each from the nearest level that has it.
 fn add_pose(levels: &[Node], edits: &mut Vec<Edit>) {
     let next = |names: &[&'static str]| {
         levels.iter().enumerate().find_map(|(level, one)| {
@@ -77,7 +76,7 @@ fn add_pose(levels: &[Node], edits: &mut Vec<Edit>) {
     }
 }
 
-/// Fills up the numbers that an element does not state with those of its classes.
+/// Completes the numbers of an element with those of its classes.
 fn add_list(levels: &[Node], name: &str, edits: &mut Vec<Edit>) {
     let stated: Vec<Vec<&str>> = levels
         .iter()
@@ -96,7 +95,7 @@ fn add_list(levels: &[Node], name: &str, edits: &mut Vec<Edit>) {
     }
 }
 
-/// Adds the attributes that the nearest class states for any kind of actuator.
+/// Adds the attributes that the nearest class has for any kind of actuator.
 fn add_shared<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>, edits: &mut Vec<Edit>) {
     for name in SHARED.iter().filter(|name| !node.has_attribute(**name)) {
         let of_class = |class: Node| {

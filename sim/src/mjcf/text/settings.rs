@@ -9,9 +9,9 @@ use crate::SimError;
 pub(in crate::mjcf) struct FileSettings {
     /// Groups of the geoms that contribute to the masses of bodies.
     pub inertia_groups: RangeInclusive<i32>,
-    /// True if contacts are enabled.
+    /// True if the file enables contacts.
     pub touches: bool,
-    /// True if gravity is enabled.
+    /// True if the file enables gravity.
     pub falls: bool,
 }
 

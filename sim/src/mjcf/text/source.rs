@@ -18,7 +18,7 @@ pub(in crate::mjcf) struct MjcfText {
     files: Vec<SourceFile>,
     /// Pieces in order of position; together they are the text.
     pieces: Vec<Piece>,
-    /// Folder in which included files are searched if they are not beside the including file.
+    /// Folder in which included files are searched if they are not in the folder of the including file.
     folder: PathBuf,
 }
 
@@ -66,7 +66,7 @@ impl MjcfText {
         self.text.push_str(&other.text[range]);
     }
 
-    /// Appends text that no file has, in the line of a byte of another text of the same files.
+    /// Appends text that is in no file, with the line of a byte of another text of the same files.
     pub(super) fn push_made(&mut self, other: &MjcfText, byte: usize, text: &str) {
         let piece = other.piece(byte);
         let start_in_file = piece.start_in_file + byte - piece.start;
@@ -80,7 +80,7 @@ impl MjcfText {
         self.files.iter().filter_map(hashed).collect()
     }
 
-    /// Returns the path of a file. If it does not exist, it is searched relative to the included files.
+    /// Returns the path of a file. A path that does not exist is searched relative to the included files.
     pub fn beside_including(&self, path: PathBuf) -> PathBuf {
         if path.exists() {
             return path;
@@ -208,7 +208,7 @@ pub(in crate::mjcf) fn refuse_files(file: &str, xml: &str) -> Result<(), SimErro
 
 impl SourceFile {
     fn line(&self, byte: usize) -> String {
-        // Text that no file has may be longer than its line.
+        // Text that is in no file may be longer than its line.
         let before = &self.text.as_bytes()[..byte.min(self.text.len())];
         format!("{}:{}", self.name, 1 + before.iter().filter(|byte| **byte == b'\n').count())
     }
@@ -219,7 +219,7 @@ pub(super) fn inside(node: &Node) -> Option<Range<usize>> {
     Some(node.first_child()?.range().start..node.last_child()?.range().end)
 }
 
-/// Describes an element by its name, or else by the nearest element around it that has one.
+/// Describes an element by its name, or else by the nearest named element around it.
 pub(in crate::mjcf) fn describe(node: &Node) -> String {
     let tag = |node: &Node| node.tag_name().name().to_string();
     let name = |node: &Node| {

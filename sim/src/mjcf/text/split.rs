@@ -14,7 +14,7 @@ use super::check::BodyBytes;
 const BALL_AXES: [(&str, [f64; 3]); 3] =
     [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
 
-/// Record of the splits in a file.
+/// Record of the split bodies of a file.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct Split {
     /// True for each body that only carries one of several joints of the next body.
@@ -27,7 +27,7 @@ pub(in crate::mjcf) struct Split {
 pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> Split {
     let mut split = Split::default();
     let (mut bodies, mut places) = (Vec::new(), Vec::new());
-    // The new index of each body of the file.
+    // New index of each body of the file.
     let mut numbers: Vec<usize> = Vec::new();
     for (entry, place) in model.bodies.drain(..).zip(bytes.drain(..)) {
         let BodyEntry { parent, mut body } = entry;
@@ -58,7 +58,7 @@ pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> S
     split
 }
 
-/// Returns the joints of a body with its balls replaced by hinges, each with its position in the text.
+/// Returns the joints of a body, with ball joints replaced by hinges, each with its position in the text.
 fn hinged(joints: Vec<Joint>, place: &BodyBytes, split: &mut Split) -> Vec<(Joint, usize)> {
     let mut found = Vec::new();
     for (joint, byte) in joints.into_iter().zip(&place.joints) {

@@ -1,4 +1,4 @@
-//! Lookup of attributes, own or inherited from classes, that `mjcf-rs` does not read.
+//! Lookup of attributes that `mjcf-rs` does not read, on an element or inherited from classes.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ impl<'a, 'i: 'a> Classes<'a, 'i> {
         Classes { named }
     }
 
-    /// Returns the classes of an element, the nearest first, each nested in the next.
+    /// Returns the classes of an element, the nearest first; each is nested in the next.
     pub fn of_element(&self, node: &Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
         let around = node.ancestors().skip(1).find_map(|one| one.attribute("childclass"));
         let name = node.attribute("class").or(around).unwrap_or("main");
@@ -27,7 +27,7 @@ impl<'a, 'i: 'a> Classes<'a, 'i> {
         places.flat_map(|class| class.ancestors().take_while(|one| one.has_tag_name("default"))).collect()
     }
 
-    /// Returns an attribute of an element: the element's own, or that of the nearest class that states it.
+    /// Returns an attribute of an element: its own value, or that of the nearest class that has it.
     pub fn stated(&self, node: &Node<'a, 'i>, attribute: &str) -> Option<&'a str> {
         node.attribute(attribute).or_else(|| {
             let elements = self.of_element(node).into_iter().filter_map(|class| {

@@ -1,4 +1,4 @@
-//! Baking: the points of a room that are lit, and their light in the units of images.
+//! Baking: the lit points of a room, and conversion of their light to image values.
 
 use std::collections::HashMap;
 
@@ -13,16 +13,16 @@ use crate::render::shading::baked::{
 };
 use crate::render::{Carrier, Light, Scenery};
 
-/// Margin around the walls, beyond which the light is that of the border.
+/// Margin around the walls up to which surfaces have light maps. Beyond it, the light is that at the border.
 const MARGIN_M: f32 = 0.5;
-/// Side of the cells that share a cube, for surfaces without a map.
+/// Side of the cells in which patches without a light map share an ambient cube.
 const CELL_M: f32 = 0.08;
-/// Share of the light of lamps that things can shadow.
+/// Share of the lamps' light that moving bodies can shadow.
 const SHADOWED_SHARE: f32 = 0.9;
 /// Number of corrections of the exposure; each takes the compression of bright tones into account.
 const CORRECTIONS: usize = 6;
 
-/// Returns the light of a room, whose walls are in a box.
+/// Computes the baked light of a room; the box bounds its walls.
 pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let box_m = [low_m - Vector::splat(MARGIN_M), high_m + Vector::splat(MARGIN_M)];
     let prepared = Prepared::new(room.clone());
@@ -66,7 +66,7 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
         }
     });
     let sheets = sheets.collect();
-    // Where a whole map is inside of something, an edge may still show.
+    // A map that is completely inside an object has no light of its own, but an edge of it may be visible.
     let texels = texels.into_iter().zip(&points).map(|(texel, point)| {
         texel.unwrap_or_else(|| cube_light(&probes.cube(point.point_m), point.normal.to_array()))
     });
@@ -74,7 +74,7 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     BakedLight { sheets, maps, texels, cubes, probes }
 }
 
-/// Returns the flat sheets of a room, by the sheets' numbers; `None` for others.
+/// Returns the flat patches of a room, by patch index; `None` for patches without a light map.
 fn sheets(prepared: &Prepared, corners: &[Vec<Vector>], box_m: [Vector; 2]) -> Vec<Option<FlatSheet>> {
     let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
         let part = &prepared.scenery.parts[sheet.part as usize];
@@ -87,7 +87,7 @@ fn sheets(prepared: &Prepared, corners: &[Vec<Vector>], box_m: [Vector; 2]) -> V
     sheets.collect()
 }
 
-/// Returns the corners of the triangles of each sheet, in its mesh's frame.
+/// Returns the corners of each patch's triangles, in the mesh's frame.
 fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
     let mut corners = vec![Vec::new(); prepared.sheets.len()];
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
@@ -99,7 +99,7 @@ fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
     corners
 }
 
-/// Returns the middle of each sheet in the world.
+/// Returns the centre of each patch in the world.
 fn middles_m(prepared: &Prepared, corners: &[Vec<Vector>]) -> Vec<Vector> {
     let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
         let part = &prepared.scenery.parts[sheet.part as usize];
@@ -110,7 +110,7 @@ fn middles_m(prepared: &Prepared, corners: &[Vec<Vector>]) -> Vec<Vector> {
     sheets.collect()
 }
 
-/// Fills in the texels of a map that are inside of something from those beside them, and smooths noise.
+/// Fills the texels of a map that are inside an object from adjacent texels, and smooths noise.
 fn finish(map: &LightMap, texels: &mut [Option<LightTexel>]) {
     let (width, height, first) = (map.width as usize, map.height as usize, map.first as usize);
     let texels = &mut texels[first..first + width * height];
@@ -149,7 +149,7 @@ fn finish(map: &LightMap, texels: &mut [Option<LightTexel>]) {
     }
 }
 
-/// From light to values of images: rooms are about as bright as without baked light.
+/// Exposure that converts light to image values. Rooms are about as bright as without baked light.
 struct RoomExposure {
     factor: f32,
 }
@@ -179,7 +179,7 @@ impl RoomExposure {
     }
 }
 
-/// Returns the light of sun and sky on a surface, mostly in the sun, without baking.
+/// Returns the light of sun and sky on a surface without baking. The surface is mostly in the sun.
 fn plain_rgb(light: &Light, normal: Vector) -> Vector {
     const SUNLIT_SHARE: f32 = 0.92;
     const HEADLIGHT: f32 = 0.09;

@@ -1,4 +1,4 @@
-//! Baked light that is kept: by the process for all renderers of a room, and on disk for the next process.
+//! Cache of baked light: in the process for all renderers of a room, and on disk for later processes.
 
 use std::fs;
 use std::hash::{Hash, Hasher};
@@ -13,15 +13,15 @@ use crate::render::path::walls_m;
 use crate::render::shading::baked::BakedLight;
 use crate::render::{Part, Pattern, Scenery};
 
-/// Version of the method: another one gives other light.
+/// Version of the baking method. It is part of the key, since other versions give different light.
 const VERSION: u32 = 2;
-/// Number of rooms whose light a process keeps, and that of files.
+/// Maximum number of rooms whose light a process caches, and maximum number of files.
 const MAX_ROOMS: usize = 16;
 const MAX_FILES: usize = 100;
-/// Most texels of an image that are compared.
+/// Maximum number of texels of an image that enter the hash.
 const MAX_HASHED_TEXELS: usize = 4096;
 
-/// The light of a room, once it is known.
+/// Baked light of a room, once it has been computed.
 #[derive(Clone)]
 struct KeptLight {
     /// Hash of everything that the light depends on.
@@ -29,8 +29,8 @@ struct KeptLight {
     light: Arc<OnceLock<Arc<BakedLight>>>,
 }
 
-/// Returns the light of a room without anything in it; `None` in the open, which has a sun. The first call
-/// computes it, or reads it from disk.
+/// Returns the baked light of an empty room. Returns `None` outdoors, where the sun shines. The first call
+/// computes the light or reads it from disk.
 pub(super) fn light_of(room: &Arc<Scenery>) -> Option<Arc<BakedLight>> {
     let walls_m = walls_m(room)?;
     let KeptLight { key, light } = kept(key(room));
@@ -48,7 +48,7 @@ pub(super) fn light_of(room: &Arc<Scenery>) -> Option<Arc<BakedLight>> {
     Some(light.get_or_init(find).clone())
 }
 
-/// Returns the place for the light of a room with a key.
+/// Returns the cache entry of a key.
 fn kept(key: u64) -> KeptLight {
     static KEPT: Mutex<Vec<KeptLight>> = Mutex::new(Vec::new());
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -63,7 +63,8 @@ fn kept(key: u64) -> KeptLight {
     light
 }
 
-/// Returns the folder of the files: in the user's cache, where there is one.
+/// Returns the folder of the cache files, in the user's cache directory. Returns `None` without such a
+/// directory.
 fn folder() -> Option<PathBuf> {
     Some(dirs::cache_dir()?.join("tandem").join("light"))
 }
@@ -73,7 +74,8 @@ fn read(path: &Path) -> Option<BakedLight> {
     postcard::from_bytes(&bytes).ok().filter(BakedLight::is_whole)
 }
 
-/// Writes the light to a file, whole or not at all. A disk that is full costs only time.
+/// Writes the light to a file atomically. If that fails, for example on a full disk, it only has to be
+/// computed again.
 fn write(path: &Path, light: &BakedLight) {
     let Some(folder) = path.parent() else { return };
     let Ok(bytes) = postcard::to_allocvec(light) else { return };
@@ -97,7 +99,7 @@ fn remove_oldest(folder: &Path) {
     }
 }
 
-/// Returns the hash of a room and of the method.
+/// Returns a hash of a room and of the method's version.
 fn key(room: &Scenery) -> u64 {
     let mut hasher = Xxh3Default::new();
     VERSION.hash(&mut hasher);

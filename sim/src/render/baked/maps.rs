@@ -1,31 +1,32 @@
-//! Light maps: rectangles of texels around the flat sheets of a room.
+//! Light maps: rectangles of texels around the flat patches of a room.
 
 use rapier3d::math::{Pose, Vector};
 
 use crate::render::shading::baked::{LightMap, SurfacePoint};
 
-/// Side of a texel, and the most texels along a side of a map.
+/// Usual side of a texel; `MAX_SIDE` limits the number of texels along a side of a map.
 const TEXEL_M: f32 = 0.08;
-/// Most texels of all maps of a room, the factor by which they grow until they are that few, and its limit.
+/// Maximum number of texels of all maps of a room. Texels grow by the factor `TEXEL_GROWTH` until there are
+/// few enough, at most to `MAX_TEXEL_FACTOR` times their usual side.
 const MAX_TEXELS: f32 = 50_000.0;
 const TEXEL_GROWTH: f32 = 1.1;
 const MAX_TEXEL_FACTOR: f32 = 8.0;
 const MAX_SIDE: f32 = 160.0;
-/// Distance from a plane within which triangles are flat.
+/// Maximum distance of points from the plane of a flat patch.
 const FLAT_M: f32 = 1e-3;
 
-/// A flat sheet in the world.
+/// A flat patch in the world.
 pub(super) struct FlatSheet {
     normal: Vector,
-    /// Directions along the sides of a rectangle around the sheet, its corner and its sides.
+    /// Rectangle around the patch: the directions of its sides, a corner, and the lengths of its sides.
     sides_direction: [Vector; 2],
     corner_m: Vector,
     sides_m: [f32; 2],
 }
 
 impl FlatSheet {
-    /// Returns the rectangle around some points with a common normal, as far as it is in a box; `None` if they
-    /// are not in one plane.
+    /// Returns the rectangle around some points with a common normal, clipped to a box. Returns `None` if
+    /// they are not in one plane.
     pub(super) fn of(
         points_m: &[Vector],
         normal: Vector,
@@ -59,9 +60,9 @@ impl FlatSheet {
         Some(FlatSheet { normal, sides_direction: along, corner_m, sides_m })
     }
 
-    /// Returns the size of texels, as a factor on the usual size, at which the maps of a room have few enough
-    /// of them. With larger texels, sheets that are small beside the growth become `None`: a mesh may have more
-    /// triangles than all maps have texels.
+    /// Returns the factor on the usual size of texels at which the maps of a room have few enough texels.
+    /// Patches smaller than the growth of a texel become `None`: a mesh may have more triangles than all maps
+    /// have texels.
     pub(super) fn fit(sheets: &mut [Option<FlatSheet>]) -> f32 {
         let mut texel_factor = 1.0;
         while texels(sheets, texel_factor) > MAX_TEXELS && texel_factor < MAX_TEXEL_FACTOR {
@@ -74,7 +75,7 @@ impl FlatSheet {
         texel_factor
     }
 
-    /// Returns the map of the sheet with texels of about `texel_factor` times the usual size.
+    /// Returns the map of the patch with texels of about `texel_factor` times the usual size.
     pub(super) fn map(&self, first: u32, texel_factor: f32) -> LightMap {
         let count = |side_m: f32| (side_m / (TEXEL_M * texel_factor)).ceil().clamp(2.0, MAX_SIDE);
         let [width, height] = self.sides_m.map(count);
@@ -90,7 +91,7 @@ impl FlatSheet {
         }
     }
 
-    /// Returns the middles of the texels, row by row.
+    /// Returns the centres of the texels, row by row.
     pub(super) fn points(&self, map: &LightMap) -> impl Iterator<Item = SurfacePoint> {
         let middle = |i: u32, count: u32, side: usize| {
             self.sides_direction[side] * ((i as f32 + 0.5) / count as f32 * self.sides_m[side])
@@ -105,7 +106,7 @@ impl FlatSheet {
     }
 }
 
-/// Returns the number of texels in the maps of sheets.
+/// Returns the number of texels in the maps of patches.
 fn texels(sheets: &[Option<FlatSheet>], texel_factor: f32) -> f32 {
     let maps = sheets.iter().flatten().map(|sheet| sheet.map(0, texel_factor));
     maps.map(|map| (map.width * map.height) as f32).sum()

@@ -11,7 +11,7 @@ use crate::render::scene::prepared::Prepared;
 const MAX_KEPT: usize = 8;
 const MAX_KEPT_TRIANGLES: usize = 1_500_000;
 
-/// Prepared sceneries, each with the one that it was made of; the latest first.
+/// Prepared sceneries, each with its source scenery; the latest first.
 static KEPT: Mutex<Vec<(Scenery, Arc<Prepared>)>> = Mutex::new(Vec::new());
 
 /// Returns the scenery as [`prepare`] prepares it for renderers.

@@ -1,4 +1,5 @@
-//! Baked light: what it shows, that it is the same wherever it comes from, and how near it is to path tracing.
+//! Tests of baked light: its plausibility, its equality from cache, disk and computation, and its similarity
+//! to path tracing.
 
 use rapier3d::math::Vector;
 
@@ -21,8 +22,8 @@ const ROOMS: [&str; 10] = [
     "office_115",
     "restaurant_110",
 ];
-/// Least structural similarity of images to path tracing, more than that without baked light; and the least
-/// difference of both in each room.
+/// Minimum structural similarity of images to path tracing in each room, which the mean without baked light
+/// does not reach; and the minimum gain from baked light in each room.
 const MIN_SIMILARITY: f64 = 0.85;
 const MIN_GAIN: f64 = 0.0;
 /// Half of the sides of the test room, and its height.
@@ -54,7 +55,7 @@ fn baked_room() -> BakedLight {
     bake(&room, walls_m)
 }
 
-/// Returns the light on the surface of the map that is nearest to a point and faces as given.
+/// Returns the light at a point, from the light map nearest to it.
 fn on_map(light: &BakedLight, point_m: Vector) -> LightTexel {
     let distance = |map: &&LightMap| {
         let [u, v] = map.place(point_m.to_array());

@@ -1,4 +1,4 @@
-//! Baked light on pushed points.
+//! Baked light on the points of [`Surfaces`].
 
 use super::shade::{StripLight, Surfaces};
 use crate::render::scene::prepared::Prepared;
@@ -7,7 +7,7 @@ use crate::render::shading::lanes::{Lanes, axes, lanes};
 use crate::render::{Carrier, PlacedScenery};
 
 impl<'a> StripLight<'a> {
-    /// Returns the light of a sheet; `cubes` are those of the parts.
+    /// Returns the light source of a patch; `cubes` are the ambient cubes of the parts.
     #[inline(always)]
     pub(super) fn of(prepared: &'a Prepared, cubes: &'a [LightCube], sheet: u32) -> StripLight<'a> {
         let Some(baked) = &prepared.baked else { return StripLight::Plain };
@@ -19,7 +19,7 @@ impl<'a> StripLight<'a> {
     }
 }
 
-/// Updates the light on each part that moves, from the state `before` to another.
+/// Updates the ambient cube of each moving part whose pose differs from the state `before`.
 pub(super) fn place_cubes(
     cubes: &mut Vec<LightCube>,
     prepared: &Prepared,
@@ -37,8 +37,9 @@ pub(super) fn place_cubes(
 }
 
 impl Surfaces {
-    /// Sets the baked light of the first `count` points of a block that have places and normals. On maps it is
-    /// looked up at the first, the last and one between: texels are much wider than pixels.
+    /// Sets the baked light of the first `count` points of a block whose positions and normals are set. Light
+    /// maps are only looked up at the first, the last and one point between: texels are much wider than
+    /// pixels.
     #[inline(always)]
     pub(super) fn set_baked<const N: usize>(
         &mut self,
@@ -88,7 +89,7 @@ impl Surfaces {
         self.set_lamp_share::<N>(at, lamps);
     }
 
-    /// Returns the unit normals of points on the side of the camera.
+    /// Returns the points' unit normals, turned towards the camera.
     #[inline(always)]
     fn outward_normals<const N: usize>(&self, at: usize) -> [Lanes<N>; 3] {
         let (normal, ray): ([Lanes<N>; 3], [Lanes<N>; 3]) = (self.normal.read(at), self.ray.read(at));

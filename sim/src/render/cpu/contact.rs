@@ -1,5 +1,5 @@
-//! Contact shadows: soft darkness where things nearly touch their support, which distinguishes standing
-//! from hovering.
+//! Contact shadows: soft darkness where bodies nearly touch their support, which distinguishes standing from
+//! hovering.
 
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
@@ -10,9 +10,9 @@ use crate::render::shading::CONTACT_TEXELS;
 use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Carrier, Part, PlacedScenery};
 
-/// Height above a surface at which a thing no longer darkens it.
+/// Height above a surface at which a body no longer darkens it.
 const REACH_M: f32 = 0.06;
-/// Maximum depth to which things sink into their support.
+/// Maximum depth to which bodies sink into their support.
 pub const SINK_M: f32 = 0.03;
 /// Maximum height of a support.
 const HIGHEST_SUPPORT_M: f32 = 1.5;
@@ -33,21 +33,22 @@ pub struct ContactMap {
     pub texels_per_m: f32,
     /// For each texel, row by row: the height of the support, and the darkness there, from 0 to 1.
     pub texel_values: Vec<[f32; 2]>,
-    /// Centre of the map; `None` before the first. The support is redrawn when it changes.
+    /// Centre of the map; `None` before the first drawing. The support is redrawn when it changes.
     focus_m: Option<Vector>,
     support: SampleRows<f32>,
     underside: SampleRows<f32>,
     corners_m: Vec<[f32; 3]>,
-    /// Darkness smoothed along the rows, and the rows that have any.
+    /// Darkness smoothed along the rows, and true for rows with any darkness.
     across_share: Vec<[f32; CONTACT_TEXELS]>,
     across_dark: Vec<bool>,
     /// Rows whose texels have to be written: they were dark, or do not have the present support yet.
     stale_rows: Vec<bool>,
-    /// True for a square of texels with darkness in it or right beside it, row by row. Most have none.
+    /// True for squares of texels with darkness in them or right beside them, row by row. Most squares have
+    /// none.
     dark_cells: Vec<bool>,
 }
 
-/// A map to draw, compiled for the available registers.
+/// Drawing of a map, compiled for the available registers.
 struct ContactDrawing<'a> {
     map: &'a mut ContactMap,
     prepared: &'a Prepared,
@@ -126,8 +127,8 @@ impl ContactMap {
         self.fill(simd, layer, &batch.take());
     }
 
-    /// Returns true if a part, given by a sphere around it, is over the map and near a surface that it
-    /// could touch.
+    /// Returns true if a part is over the map and near a surface that it could touch. A sphere bounds the
+    /// part.
     fn concerns(&self, layer: HeightLayer, centre_m: Vector, around_m: f32) -> bool {
         let [u, v] = self.place(centre_m);
         let around = around_m * self.texels_per_m;
@@ -142,7 +143,7 @@ impl ContactMap {
         low_m < support_m + REACH_M && high_m > support_m - SINK_M
     }
 
-    /// Returns the column and row below a point, counted from the corner.
+    /// Returns the column and row of the texel below a point, counted from the corner.
     #[inline(always)]
     fn place(&self, point_m: Vector) -> [f32; 2] {
         let [x_m, y_m] = self.corner_m;
@@ -179,8 +180,8 @@ impl ContactMap {
         );
     }
 
-    /// Darkens texels whose lowest underside is near the support, smoothed. Most rows have no darkness,
-    /// and stay unchanged.
+    /// Darkens texels where the lowest underside is near the support, and smooths the darkness. Most rows
+    /// have no darkness, and stay unchanged.
     #[inline(always)]
     fn darken(&mut self) {
         self.dark_cells.clear();
@@ -310,7 +311,7 @@ fn blurred(at: impl Fn(usize, usize) -> f32) -> [f32; CONTACT_TEXELS] {
     sums
 }
 
-/// Returns the neighbour that a weight applies to; at the border, the border itself.
+/// Returns the index of the texel that a weight applies to, clamped to the map.
 #[inline(always)]
 fn shifted(i: usize, offset: usize) -> usize {
     (i + offset).saturating_sub(BLUR.len() / 2).min(CONTACT_TEXELS - 1)

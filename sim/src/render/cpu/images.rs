@@ -1,4 +1,4 @@
-//! Colours, gloss, normals and light by layers of points that are shaded together.
+//! Colours, gloss, normals and emitted light from the layers of images, for points that are shaded together.
 
 use rapier3d::math::Vector;
 
@@ -13,7 +13,7 @@ use crate::render::{Light, Pattern};
 pub(super) struct ShownSurface<const N: usize> {
     /// Linear colours.
     pub albedo: [Lanes<N>; 3],
-    /// Linear colours of the image alone; 1 without.
+    /// Linear colours of the image alone; 1 without an image.
     pub texture: [Lanes<N>; 3],
     pub alpha: Lanes<N>,
     /// Normals of any length.
@@ -54,7 +54,7 @@ impl Facet {
         )
     }
 
-    /// Returns the surface with an image at points that have rays, places, normals and depths.
+    /// Returns the surface with an image at points whose rays, positions, normals and depths are set.
     #[inline(always)]
     pub(super) fn shown<const N: usize>(
         &self,
@@ -127,9 +127,9 @@ impl Facet {
         }
     }
 
-    /// Returns the differences of image coordinates between points and those that rays meet on the same
-    /// plane which are turned by `step_ray`. Points have derivatives of the coordinates along their rays,
-    /// normals, and scalar products of both.
+    /// Returns the change of the image coordinates from each point to where its ray, turned by `step_ray`,
+    /// meets the same plane. `along_ray` has the derivatives of the coordinates along the rays, and `facing`
+    /// the scalar products of rays and normals.
     #[inline(always)]
     fn image_step<const N: usize>(
         &self,
@@ -163,14 +163,15 @@ impl Surfaces {
         self.emitted.set(at, emitted);
     }
 
-    /// Returns the shares of ambient light that reach points, and the linear colours that they emit.
+    /// Returns the shares of ambient light that reach points, and the linear colours of the light that they
+    /// emit.
     #[inline(always)]
     pub(super) fn layers(&self, at: usize) -> (Lanes, [Lanes; 3]) {
         (*block(&self.ambient_share, at), self.emitted.block(at))
     }
 
-    /// Adds what layers change in the colours of points that are lit without them. `ambient` is ambient light,
-    /// which they keep out.
+    /// Corrects colours that were computed without layers. It adds emitted light, and removes the share of
+    /// the ambient light `ambient` that layers block.
     #[inline(always)]
     pub(super) fn add_layers(&self, at: usize, ambient: [Lanes; 3], colours: &mut [Lanes; 3]) {
         let (albedo, (ambient_share, emitted)) = (self.albedo.block(at), self.layers(at));

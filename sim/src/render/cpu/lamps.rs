@@ -33,7 +33,7 @@ enum LampShadow {
     Cone(Box<ConeShadow>),
 }
 
-/// Surfaces that a spot or a point light shines on.
+/// Shadow map of a spot or a point light: the surfaces that it shines on.
 struct ConeShadow {
     seen: RenderTarget,
     map: Affine,
@@ -41,7 +41,7 @@ struct ConeShadow {
     texel_m: f32,
 }
 
-/// Points whose light is summed, in the values of the file.
+/// Sums of the light on several points, in file values (sRGB).
 struct Sums {
     normal: [Lanes; 3],
     to_eye: [Lanes; 3],
@@ -53,7 +53,8 @@ struct Sums {
     glossy: [Lanes; 3],
 }
 
-/// Colours of points in the values of files: their own, and those of their images alone, which are 1 without.
+/// Colours of points in file values (sRGB): `own` is the material times the texture. The upper limit `most`
+/// is the texture alone, 1 without a texture.
 struct LitColours {
     own: [Lanes; 3],
     most: [Lanes; 3],
@@ -113,8 +114,8 @@ impl LitLamps {
 }
 
 impl Surfaces {
-    /// Adds the colours of all pushed points as [`Surfaces::shade`] does, in the light of lamps.
-    /// `back_direction` leads from the place at which the camera looks to the camera.
+    /// Adds the colours of all points like [`Surfaces::shade`], in the light of lamps. `back_direction` is
+    /// the direction from the camera's target to the camera.
     #[inline(always)]
     pub(super) fn shade_by_lamps(
         &mut self,
@@ -161,7 +162,7 @@ impl Surfaces {
         }
         let mut values = [[0.0; LANES]; 3];
         sums.show(&surface, &mut values);
-        // MuJoCo limits the light of each lamp with shadows by itself.
+        // MuJoCo limits the light of each lamp with shadows separately.
         for lamp in lamps.lamps.iter().filter(casts_shadow) {
             sums.add(lamp, &point_m, count - at);
             sums.show(&surface, &mut values);
@@ -183,7 +184,7 @@ impl Surfaces {
         )
     }
 
-    /// Returns the orientation of points, without light.
+    /// Returns sums with the orientation of points, and no light yet.
     #[inline(always)]
     fn unlit(&self, at: usize, [specular, shininess]: [Lanes; 2], ambient: Lanes) -> Sums {
         let (ray, normal) = (self.ray.block(at), self.normal.block(at));
@@ -209,8 +210,8 @@ impl Surfaces {
 }
 
 impl Sums {
-    /// Adds the colours that the light gives to surfaces, and clears it. An image multiplies the light,
-    /// highlights and all, once this is limited.
+    /// Adds the surfaces' colours in the summed light, and clears the light. The light, highlights included,
+    /// is limited before an image multiplies it.
     #[inline(always)]
     fn show(&mut self, surface: &LitColours, values: &mut [Lanes; 3]) {
         for (axis, sum) in values.iter_mut().enumerate() {
@@ -232,7 +233,7 @@ impl Sums {
         self.add_light([ambient_rgb, diffuse_rgb, specular_rgb], &towards, &[1.0; LANES]);
     }
 
-    /// Adds the light of a lamp at points of which the first `count` matter.
+    /// Adds the light of a lamp at the first `count` points.
     #[inline(always)]
     fn add(&mut self, LitLamp { light, shadow }: &LitLamp, point_m: &[Lanes; 3], count: usize) {
         let colours_rgb = [light.ambient_rgb, light.diffuse_rgb, light.specular_rgb];
@@ -241,7 +242,7 @@ impl Sums {
             if *share <= 0.0 || matches!(shadow, LampShadow::None) {
                 continue;
             }
-            // In the shade of itself, a surface has no other light of the lamp than the ambient one.
+            // A surface that faces away from a lamp receives only its ambient light.
             if dot(&self.normal, &towards, i) <= 0.0 && light.ambient_rgb == Vector::ZERO {
                 continue;
             }
@@ -276,8 +277,8 @@ impl Sums {
     }
 }
 
-/// Returns the directions to a light, and the shares of its light that arrive without shadows, as
-/// [`arriving`](crate::render::shading::lamps::arriving) does.
+/// Returns the directions to a light, and the shares of its light that reach the points without shadows, like
+/// [`arriving`](crate::render::shading::lamps::arriving).
 #[inline(always)]
 fn arriving(light: &FileLight, point_m: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
     let direction = light.direction;
@@ -324,7 +325,7 @@ impl LampShadow {
 }
 
 impl ConeShadow {
-    /// Filters bilinearly over three texels, as maps of the sun do.
+    /// Filters bilinearly over three texels, like the sun's shadow map.
     fn sunlit(&self, point_m: Vector, normal: Vector) -> f32 {
         let [_, _, distance_m] = self.map.map(point_m);
         let offset_m = LAMP_NORMAL_TEXELS * self.texel_m * distance_m.max(0.0);

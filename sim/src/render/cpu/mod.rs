@@ -1,4 +1,5 @@
-//! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
+//! The embedded renderer: a visibility buffer of triangle numbers that is shaded afterwards, with four
+//! samples per pixel.
 
 mod baked;
 mod blend;
@@ -39,9 +40,9 @@ use veil::Veils;
 use view::{Row, View};
 use workspace::Workspace;
 
-/// Renderer on the calling thread, and several images of a state in parallel. It holds its buffers only
-/// while it draws. The shadows of its last state are reused the next time, unless too many other
-/// renderers have drawn in between.
+/// Renderer on the CPU. It draws on the calling thread, and several images of a state in parallel. It holds
+/// its buffers only while it draws. The shadows of its last state are reused the next time, unless too many
+/// other renderers have drawn in between.
 pub(super) struct CpuRenderer {
     prepared: Arc<Prepared>,
     srgb: SrgbTable,
@@ -52,13 +53,13 @@ pub(super) struct CpuRenderer {
 /// A state of the scenery with its light, shared by the images of all cameras.
 #[derive(Default)]
 struct LitState {
-    /// State that shadow, contacts and facets belong to.
+    /// State for which shadow, contacts and facets were computed.
     placed: PlacedScenery,
     shadow: ShadowMap,
     lamps: LitLamps,
     contact: ContactMap,
     facets: Vec<Facet>,
-    /// Light on each part that moves, by the parts' numbers.
+    /// Ambient cube of each moving part, by part index.
     cubes: Vec<LightCube>,
 }
 
@@ -77,7 +78,7 @@ impl LitState {
 struct Canvas {
     row: Row,
     samples: RenderTarget,
-    /// One sample a pixel, at its centre, from which depth and ids are read.
+    /// One sample per pixel, at its centre, from which depth and ids are read.
     centres: RenderTarget,
     /// Blended surfaces at the samples, and at the centres.
     veils: Veils,
@@ -145,8 +146,8 @@ impl Renderer for CpuRenderer {
     }
 }
 
-/// The light of a state to draw. This and [`PictureDrawing`] are compiled once more for processors with
-/// wide registers, with everything that is inlined into them; the results are bit-identical.
+/// Drawing of a state's light. This and [`PictureDrawing`] are compiled once more for processors with wide
+/// registers, including everything that is inlined into them. The results are bit-identical.
 struct StateDrawing<'a> {
     state: &'a mut LitState,
     prepared: &'a Prepared,
@@ -171,7 +172,7 @@ impl WithSimd for StateDrawing<'_> {
     }
 }
 
-/// An image to draw.
+/// Drawing of an image.
 struct PictureDrawing<'a> {
     state: &'a LitState,
     prepared: &'a Prepared,

@@ -1,5 +1,5 @@
-//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above,
-//! and a faint headlight at the camera.
+//! Patches in one state of the world, and their light: one sun with shadow, a sky that lights from above, and
+//! a faint headlight at the camera.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
@@ -20,7 +20,7 @@ pub(super) const BATCH: usize = 64;
 /// Capacity for whole blocks of points, the last of which may extend beyond the batch.
 const ROOM: usize = BATCH + LANES;
 
-/// A sheet in the world.
+/// A patch in the world.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Facet {
     /// The normal at a point p, of any length, is `normal + slope_1_m * p`.
@@ -31,7 +31,7 @@ pub(super) struct Facet {
     pub pattern: Pattern,
     /// Map to the frame of the pattern, or to the coordinates of the image.
     pub pattern_from_world: Affine,
-    /// True if it belongs to the room, and is darkened by things on it.
+    /// True if the patch belongs to the room, where contact shadows fall on it.
     pub carries: bool,
 }
 
@@ -44,7 +44,7 @@ pub(super) enum StripLight<'a> {
     Cube(&'a LightCube),
 }
 
-/// Adjacent pixels that show one sheet.
+/// Adjacent pixels that show one patch.
 pub(super) struct Strip<'a> {
     pub facet: &'a Facet,
     /// Image of the facet's part.
@@ -55,13 +55,13 @@ pub(super) struct Strip<'a> {
     pub nearness_1_m: &'a [f32],
     pub first_pixel: usize,
     pub count: usize,
-    /// Share of the pixels that the sheet covers.
+    /// Share of the pixels that the patch covers.
     pub share: f32,
     /// Alpha of a blended part; `None` for a solid one.
     pub alpha: Option<f32>,
-    /// Baked light of the sheet.
+    /// Baked light of the patch.
     pub light: StripLight<'a>,
-    /// True if lamps light the scenery, which need more of a surface than a sun does.
+    /// True if lamps light the scenery. They need more properties of a surface than a sun does.
     pub has_lamps: bool,
     /// True if layers of some surfaces change ambient light or emit light.
     pub has_layers: bool,
@@ -80,13 +80,13 @@ pub(super) struct Surfaces {
     /// Emission, specular strength and shininess, and metallic shares, for lamps.
     pub gloss: Vectors,
     metallic_share: [f32; ROOM],
-    /// Shares of ambient light, and emitted light, by layers; without meaning unless `has_layers`.
+    /// Shares of ambient light, and emitted light, by layers; valid only with `has_layers`.
     pub ambient_share: [f32; ROOM],
     pub emitted: Vectors,
     pub has_layers: bool,
-    /// Colours of images alone, for lamps; 1 without.
+    /// Colours of images alone, for lamps; 1 without an image.
     pub texture: Vectors,
-    /// Baked light, and the share of it that things shadow.
+    /// Baked light, and the share of it that moving bodies can shadow.
     pub baked: Vectors,
     lamp_share: [f32; ROOM],
     /// Share of light that contact shadows leave.
@@ -117,7 +117,7 @@ impl Vectors {
         )
     }
 
-    /// Returns the vectors of fewer points.
+    /// Returns the vectors of `N` points, which may be fewer than a block.
     #[inline(always)]
     pub(super) fn read<const N: usize>(&self, at: usize) -> [Lanes<N>; 3] {
         axes(
@@ -156,7 +156,7 @@ pub(super) fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
     a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
 }
 
-/// Updates the facets, by their sheets' numbers, from the state `before` to another.
+/// Updates the facets, by patch index, of the parts whose pose differs from the state `before`.
 pub(super) fn place(
     facets: &mut Vec<Facet>,
     prepared: &Prepared,
@@ -175,7 +175,7 @@ pub(super) fn place(
     }
 }
 
-/// Places the facets of a part with these sheets.
+/// Updates the facets of a part with these patches.
 fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
     let part = &prepared.scenery.parts[number];
     let rotation = Matrix::from_quat(pose.rotation);
@@ -249,7 +249,7 @@ impl Surfaces {
         for start in (0..strip.count).step_by(N) {
             let at = self.count + start;
             let samples = &strip.nearness_1_m[start * SAMPLES..];
-            // Samples beyond the strip have no meaning, but the last strip of a row has none beyond it.
+            // Samples beyond the strip are meaningless, but the last strip of a row has no samples beyond it.
             let nearness_1_m: Lanes<N> = if samples.len() >= N * SAMPLES {
                 lanes(|i| samples[i * SAMPLES])
             } else {
@@ -282,7 +282,7 @@ impl Surfaces {
         }
     }
 
-    /// Sets the surface of points that have rays, places and depths. Returns its alpha.
+    /// Sets the surface of points whose rays, positions and depths are set. Returns its alpha.
     #[inline(always)]
     fn set_surface<const N: usize>(
         &mut self,
@@ -330,8 +330,8 @@ impl Surfaces {
         *block_mut(&mut self.lamp_share, at) = share;
     }
 
-    /// Returns cosines to the sun, shares of its light, highlights, and shares of the baked light that things
-    /// shadow.
+    /// Returns cosines to the sun, shares of its light, highlights, and shares of the baked light that moving
+    /// bodies block.
     #[inline(always)]
     pub(super) fn towards_sun(&self, at: usize) -> [Lanes; 4] {
         [&self.sun_factor, &self.sunlit_share, &self.highlight_factor, &self.lamp_share]
@@ -350,7 +350,7 @@ impl Surfaces {
         std::mem::take(&mut self.count)
     }
 
-    /// Returns the points' weights in their pixels, less what contact shadows take.
+    /// Returns the points' weights in their pixels, reduced by contact shadows.
     #[inline(always)]
     pub(super) fn shares(&self, at: usize) -> Lanes {
         let (open, share) = (block(&self.open_share, at), block(&self.pixel_share, at));
@@ -363,8 +363,8 @@ impl Surfaces {
         *block(&self.metallic_share, at)
     }
 
-    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points. `tint_rgb`
-    /// multiplies baked light; without, sun and sky light them.
+    /// Adds the linear colours of all points to those of their pixels, and clears the points. `tint_rgb`
+    /// multiplies baked light; if it is `None`, sun and sky light the points.
     #[inline(always)]
     pub(super) fn shade(
         &mut self,
@@ -455,7 +455,7 @@ impl Surfaces {
         *block_mut::<u32, LANES>(&mut self.cell, at) = ShadowMap::cells(&texel);
     }
 
-    /// Returns the total light, weighted by the points' shares.
+    /// Returns the colours of points in the light of sun, sky and headlight, weighted by the points' shares.
     #[inline(always)]
     fn lit(&self, at: usize, light: &Light) -> [Lanes; 3] {
         let (albedo, normal) = (self.albedo.block(at), self.normal.block(at));

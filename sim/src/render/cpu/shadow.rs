@@ -12,20 +12,21 @@ use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{BIAS_M, FADE_TEXELS, TEXELS, normal_offset_m, sun_map};
 use crate::render::{Carrier, PlacedScenery};
 
-/// Texels along each side of a cell. A point nearer than everything in its cell is in the sun, without a
-/// look at the texels.
+/// Texels along each side of a cell. A point nearer to the sun than everything in its cell is lit, without a
+/// lookup of texels.
 const CELL: usize = 8;
 const CELLS: usize = TEXELS / CELL;
 const _: () = assert!(CELLS == u128::BITS as usize, "a row of cells is the bits of a number");
-/// The cell of everything outside of the map, which is in the sun.
+/// Index of the cell for all points outside the map, which are lit.
 const OUTSIDE: u32 = (CELLS * CELLS) as u32;
-/// Texels that the filter reads along each axis: a cell covers those that a filter starting in it can reach.
+/// Number of texels that the filter reads along each axis. A cell covers all texels that a filter starting in
+/// it can reach.
 const TAPS: usize = 4;
 const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
 
 #[derive(Default)]
 pub(super) struct ShadowMap {
-    /// Centre of the map; `None` before the first.
+    /// Centre of the map; `None` before the first drawing.
     focus_m: Option<Vector>,
     /// Direction to the sun.
     sun_direction: Vector,
@@ -36,19 +37,20 @@ pub(super) struct ShadowMap {
     still: ShadowLayer,
     /// The shadows of everything.
     all: ShadowLayer,
-    /// For each row of cells, those in which `all` may differ from `still`, one bit a column.
+    /// Cells in which `all` may differ from `still`: one number per row of cells, one bit per column.
     moving: Vec<u128>,
     corners: Vec<[f32; 3]>,
     front: Vec<u32>,
 }
 
-/// "Nearness" here is [`SUN_DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
+/// Nearness of the surfaces seen from the sun: their position along the direction to the sun, which is
+/// [`SUN_DISTANCE_M`] at the focus.
 ///
 /// [`SUN_DISTANCE_M`]: crate::render::shading::SUN_DISTANCE_M
 #[derive(Default)]
 struct ShadowLayer {
     nearness_m: SampleRows<f32>,
-    /// Least and greatest nearness of each cell, row by row; behind them, those of [`OUTSIDE`].
+    /// Smallest and largest nearness of each cell, row by row; the last entry is that of [`OUTSIDE`].
     cells_m: Vec<[f32; 2]>,
 }
 
@@ -58,7 +60,7 @@ impl ShadowMap {
         self.focus_m = None;
     }
 
-    /// Draws the shadows of everything that casts one, in the light of a sun in a direction.
+    /// Draws the shadows of everything that casts shadows, for a sun in this direction.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
@@ -86,7 +88,7 @@ impl ShadowMap {
         self.all.measure(&self.moving);
     }
 
-    /// Draws the shadows of the room, or those of all other parts, into their layer.
+    /// Draws the shadows of the room, or the shadows of all other parts, into their layer.
     #[inline(always)]
     fn draw_parts<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery, of_room: bool) {
         let mut batch = TriangleBatch::default();
@@ -141,7 +143,7 @@ impl ShadowMap {
         [lanes(|i| u[i] - 0.5), lanes(|i| v[i] - 0.5), lanes(|i| nearness_m[i] + BIAS_M)]
     }
 
-    /// Returns the light at a point as [`ShadowMap::sunlit`] does.
+    /// Returns the light at a point like [`ShadowMap::sunlit`].
     pub(super) fn sunlit_at(&self, point_m: Vector, normal: Vector) -> f32 {
         let [u, v, nearness_m] = self.map_from_world.map(point_m + normal * self.normal_offset_m);
         let inside = 1.0..(TEXELS - 3) as f32;
@@ -153,7 +155,7 @@ impl ShadowMap {
         self.sunlit([u, v, nearness_m + BIAS_M], cell)
     }
 
-    /// Returns the cells of filters that begin at some texels.
+    /// Returns the cells of filters that begin at these texels.
     #[inline(always)]
     pub(super) fn cells([u, v, _]: &[Lanes; 3]) -> [u32; LANES] {
         let inside = |i: f32| (i >= 1.0) & (i < (TEXELS - 3) as f32);
@@ -179,8 +181,8 @@ impl ShadowMap {
         }
     }
 
-    /// Returns the light of a wide lamp in the sun's direction, as [`ShadowMap::sunlit`] does: things far from
-    /// a surface take less of it.
+    /// Returns the light of a wide lamp in the sun's direction, like [`ShadowMap::sunlit`]. Objects far from
+    /// a surface block less of it.
     #[inline(always)]
     pub(super) fn lamplit(&self, [u, v, nearness_m]: [f32; 3], cell: u32) -> f32 {
         let [_, greatest_m] = self.all.cells_m[cell as usize];

@@ -1,4 +1,4 @@
-//! The render target: for each sample of an image, the nearest sheet and its nearness.
+//! The render target: for each sample of an image, the nearest patch and its nearness.
 
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
@@ -18,8 +18,8 @@ pub(super) struct RenderTarget {
     sheet: SampleRows<u32>,
 }
 
-/// Fills `samples`, [`SAMPLES`] a pixel along each axis, and if given `centres`, one a pixel, with the
-/// camera's view.
+/// Draws the camera's view into `samples`, with [`SAMPLES`] per pixel along each axis, and into `centres`, if
+/// given, with one sample per pixel.
 #[inline(always)]
 pub(super) fn draw<S: Simd>(
     simd: S,
@@ -45,7 +45,7 @@ pub(super) fn draw<S: Simd>(
     );
 }
 
-/// Fills `samples` with the nearness of what casts shadows, as a lamp at the camera's place sees it.
+/// Fills `samples` with the nearness of shadow casters, as seen by a lamp at the camera's pose.
 #[inline(always)]
 pub(super) fn draw_casting<S: Simd>(
     simd: S,
@@ -67,8 +67,8 @@ pub(super) fn draw_casting<S: Simd>(
     );
 }
 
-/// Fills `layer` with the nearest blended surfaces in front of the solid ones and, if given, behind those of
-/// the layer before. Returns false if there are none.
+/// Fills `layer` with the nearest blended surfaces in front of the solid ones and, if given, behind the
+/// previous layer. Returns false if there are none.
 #[inline(always)]
 pub(super) fn draw_veils<S: Simd>(
     simd: S,
@@ -161,7 +161,7 @@ impl Lens {
         Lens { focal_px: camera.focal_px() * SAMPLES as f32, centre_px: [width * 0.5, height * 0.5] }
     }
 
-    /// Returns column, row and nearness.
+    /// Returns column, row and nearness of a point.
     #[inline(always)]
     fn screen(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let nearness = -1.0 / z;
@@ -169,7 +169,7 @@ impl Lens {
         [cx + x * self.focal_px * nearness, cy - y * self.focal_px * nearness, nearness]
     }
 
-    /// Returns true if a mesh's bounding sphere reaches into the viewing pyramid.
+    /// Returns true if a mesh's bounding sphere reaches into the view frustum.
     fn sees(&self, (centre, radius): (Vector, f32), camera_from_mesh: Pose) -> bool {
         let c = camera_from_mesh * centre;
         let inside = |across: f32, half: f32| {
@@ -208,7 +208,7 @@ impl RenderTarget {
         self.nearness_1_m.row(row)
     }
 
-    /// Returns the numbers of the sheets that a finished row shows.
+    /// Returns the patch indices that a finished row shows.
     #[inline(always)]
     pub(super) fn sheets(&self, row: usize) -> &[u32] {
         self.sheet.row(row)
@@ -220,8 +220,8 @@ impl RenderTarget {
         self.sheet.fit(grid, NOTHING);
     }
 
-    /// Clears the sheets of a row where nothing was drawn, which still hold values of other images. Few
-    /// rows have such samples, so this is faster than clearing all sheets at first.
+    /// Clears the patch indices of a row where nothing was drawn, which still hold values of other images.
+    /// Few rows have such samples, so this is faster than clearing all indices at first.
     #[inline(always)]
     pub(super) fn finish_row(&mut self, row: usize) {
         let nearness_1_m = self.nearness_1_m.row(row);
@@ -232,7 +232,7 @@ impl RenderTarget {
         }
     }
 
-    /// Draws triangles, tagged with their sheets, into those samples for which they are the nearest.
+    /// Draws triangles, tagged with their patches, into those samples for which they are the nearest.
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, outlines: &Outlines) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
@@ -300,7 +300,7 @@ fn clip_near(corners_m: [Vector; 3]) -> ([Vector; 4], usize) {
             count += 1;
         }
         if visible(a) != visible(b) {
-            // Always from the visible end, so that neighbours cut their common edge at the same point.
+            // Cutting from the visible end gives neighbours the same point on their common edge.
             let (from, to) = if visible(a) { (a, b) } else { (b, a) };
             kept[count] = from + (to - from) * ((-NEAR_M - from.z) / (to.z - from.z));
             // Rounding must not put the corner back in front of the plane.

@@ -13,7 +13,7 @@ use crate::render::{Camera, Frame, PlacedScenery};
 #[derive(Default)]
 pub(super) struct Veils {
     layers: Vec<RenderTarget>,
-    /// Number of layers that show something.
+    /// Number of layers with any surface.
     count: usize,
 }
 
@@ -44,12 +44,13 @@ impl Veils {
         }
     }
 
-    /// Returns the layers that show something, the farthest first.
+    /// Returns the layers with any surface, the farthest first.
     pub(super) fn farthest_first(&self) -> impl Iterator<Item = &RenderTarget> {
         self.layers[..self.count].iter().rev()
     }
 
-    /// Sets depth and ids where images with alpha show a surface. The layers are those of pixels' centres.
+    /// Sets depth and ids at pixels where an image with alpha shows a surface. The layers must be those at
+    /// the pixels' centres.
     pub(super) fn measure(&self, prepared: &Prepared, facets: &[Facet], rays: &Rays, frame: &mut Frame) {
         let width = frame.width as usize;
         for layer in self.farthest_first() {

@@ -1,4 +1,4 @@
-//! Resolution of samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
+//! Resolution of samples to pixels: colour where a camera's rays meet triangles, and outlines between bodies.
 
 use std::ops::Range;
 
@@ -18,15 +18,15 @@ use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
 const TOGETHER: usize = size_of::<u64>();
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
-/// Numbers of a pixel's samples, and of those to the right and below.
+/// Patch indices or ids of a pixel's samples, and of the samples to the right and below.
 type Neighbours = [[u32; SAMPLES + 1]; SAMPLES + 1];
 
 /// A filled target, ready to be shaded.
 pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
-    /// The facet of each sheet.
+    /// The facet of each patch.
     pub facets: &'a [Facet],
-    /// Light on each part that moves.
+    /// Ambient cube of each moving part.
     pub cubes: &'a [LightCube],
     pub target: &'a mut RenderTarget,
     pub veils: &'a Veils,
@@ -37,17 +37,17 @@ pub(super) struct View<'a> {
     pub rays: Rays,
 }
 
-/// Buffers that are reused from image to image.
+/// Buffers for a row of pixels, reused from image to image.
 pub(super) struct Row {
     pub surfaces: Surfaces,
     /// For each column of samples, non-zero if an edge is in it or to its right.
     edges: Vec<u32>,
-    /// For each pixel, 1 if an edge is in it or beside it, otherwise 0. Behind the last are [`TOGETHER`]
-    /// ones.
+    /// For each pixel, 1 if an edge is in it or beside it, otherwise 0. After the last pixel follow
+    /// [`TOGETHER`] entries of 1.
     mixed: Vec<u8>,
-    /// Linear colours of the pixels so far: all red shares, all green, all blue.
+    /// Sums of the pixels' linear colours so far: all red values, all green, all blue.
     pub sum_rgb: [Vec<f32>; 3],
-    /// The same for one layer of blended surfaces, and the shares of light that they keep out.
+    /// The same for one layer of blended surfaces, and the shares of light that they block.
     pub veil_rgb: [Vec<f32>; 3],
     pub veil_alpha: Vec<f32>,
 }
@@ -76,8 +76,8 @@ impl View<'_> {
         rgb
     }
 
-    /// Computes the colours of a row of pixels: means of their samples. A sheet that covers several of
-    /// them is shaded once.
+    /// Computes the colours of a row of pixels, which are the means of their samples. A patch that covers
+    /// several samples is shaded once.
     #[inline(always)]
     fn row(&self, y: usize, width: usize, row: &mut Row) {
         let last = self.target.height() - 1;
@@ -99,7 +99,8 @@ impl View<'_> {
                 x += 1;
                 continue;
             }
-            // Pixels show one sheet as long as they are plain: an edge would be in the last of them.
+            // Adjacent pixels without an edge show one patch. An edge between two of them would mark the
+            // first as mixed.
             let end = next_mixed(&row.mixed, x).min(x + row.surfaces.room());
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
@@ -107,7 +108,7 @@ impl View<'_> {
         self.shade(&mut row.surfaces, &mut row.sum_rgb);
     }
 
-    /// Adds the colours of all pushed points.
+    /// Adds the colours of all points of `surfaces`.
     #[inline(always)]
     pub(super) fn shade(&self, surfaces: &mut Surfaces, sum_rgb: &mut [Vec<f32>; 3]) {
         match self.lamps {
@@ -119,8 +120,8 @@ impl View<'_> {
         }
     }
 
-    /// Shows a sheet on neighbouring pixels that it covers, or on a share of them, sampled at the first
-    /// one's `sample`.
+    /// Adds a patch to adjacent pixels that it covers, or covers by a share. `sample` is the sample of the
+    /// first pixel.
     #[inline(always)]
     fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
         if let (NOTHING, Some(sky)) = (sheet, &self.prepared.sky) {
@@ -154,7 +155,7 @@ impl View<'_> {
         row.surfaces.push(&self.rays, self.contact, &strip);
     }
 
-    /// Shades a pixel with an edge in or beside it; `rows` are those of its samples and the one below.
+    /// Shades a pixel with an edge in or beside it; `rows` are the rows of its samples and the row below.
     #[inline(always)]
     fn mixed(&self, row: &mut Row, [x, y]: [usize; 2], rows: [&[u32]; SAMPLES + 1]) {
         let sx = x * SAMPLES;
@@ -186,8 +187,8 @@ impl View<'_> {
         [self.prepared.id(a), self.prepared.id(b), self.prepared.id(c)]
     }
 
-    /// Returns the number of samples in row `y` whose neighbour to the right or below shows another
-    /// thing at another depth.
+    /// Returns the number of samples in row `y` whose neighbour to the right or below shows another id at
+    /// another depth.
     fn outlines(&self, y: usize, columns: [usize; 3], seen: &Neighbours, ids: &Neighbours) -> u32 {
         let last = self.target.height() - 1;
         let two_things = |[r, c]: [usize; 2], [other_r, other_c]: [usize; 2]| {
@@ -241,12 +242,12 @@ fn next_mixed(mixed: &[u8], mut x: usize) -> usize {
     }
 }
 
-/// Finds the columns in which samples show another sheet than the one below or to the right.
+/// Finds the columns in which samples show another patch than the sample below or to the right.
 #[inline(always)]
 fn mark_edges([top, middle, bottom]: [&[u32]; SAMPLES + 1], edges: &mut Vec<u32>) {
     edges.resize(top.len(), 0);
     let last = top.len() - 1;
-    // Nothing is to the right of the last.
+    // The last sample has no neighbour to the right.
     edges[last] = (top[last] ^ middle[last]) | (middle[last] ^ bottom[last]);
     let [(top, top_right), (middle, middle_right), (bottom, bottom_right)] =
         [top, middle, bottom].map(|row| (&row[..last], &row[1..=last]));

@@ -1,16 +1,18 @@
-//! Buffers for drawing: megabytes that a renderer does not need while it waits for its next image. So the
-//! renderers of a process share them, and at most as many draw at the same time as there are processor cores.
+//! Shared buffers for drawing. They are megabytes that a renderer does not need between images, so the
+//! renderers of a process share them. At most as many renderers draw at the same time as there are processor
+//! cores.
 
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use super::{Canvas, LitState};
 
-/// Number of lit states kept for their renderers' next images. With fewer, two renderers that alternate
-/// would light their rooms anew each time. If more draw at the same time, as many are kept as draw.
+/// Number of lit states kept for their renderers' next images. With fewer states, two renderers that
+/// alternate would light their rooms anew each time. If more renderers draw at the same time, one state is
+/// kept for each of them.
 const WAITING_STATES: usize = 2;
 
-/// Number of canvases kept for images: as many as a task has robots, and the third person.
+/// Number of canvases kept for images: one for each robot of a task, and one for the third-person camera.
 const WAITING_CANVASES: usize = 4;
 
 /// Buffers that are not in use.
@@ -23,10 +25,10 @@ struct Shared {
 }
 
 static SHARED: Mutex<Shared> = Mutex::new(Shared { drawing: 0, states: Vec::new(), canvases: Vec::new() });
-/// Signals that a drawing has ended.
+/// Signals the end of a drawing.
 static ENDED: Condvar = Condvar::new();
 
-/// Buffers in use by one renderer. They are given back on drop, unless the drawing has panicked.
+/// Buffers in use by one renderer. They are returned on drop, unless the drawing has panicked.
 pub struct Workspace {
     renderer: u64,
     /// The renderer's last state, if no other renderer has taken it.

@@ -1,19 +1,19 @@
-//! Baked light in a device's memory: the cubes of parts, those of the room, and the texels of its maps.
+//! Baked light in GPU memory: ambient cubes of parts and of the room, and the texels of its light maps.
 
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::baked::{BakedLight, LightCube, LightTexel, SheetLight};
 use crate::render::{Carrier, PlacedScenery};
 
-/// Count of numbers about light in `Face`.
+/// Number of words about light in `Face`.
 pub(super) const FACE_NUMBERS: usize = 12;
-/// Count of sides of a cube.
+/// Number of sides of a cube.
 const SIDES: u32 = 6;
 /// Kinds of light in `Face`.
 const ON_MAP: u32 = 1;
 const ON_CUBE: u32 = 2;
 const ON_PART: u32 = 3;
 
-/// Returns all numbers of `baked`; those of parts are not set.
+/// Returns all values of `baked`; the cubes of parts are not set.
 pub(super) fn numbers(prepared: &Prepared) -> Vec<LightTexel> {
     let Some(baked) = &prepared.baked else { return Vec::new() };
     let mut numbers = vec![LightTexel::default(); prepared.scenery.parts.len() * SIDES as usize];
@@ -22,7 +22,7 @@ pub(super) fn numbers(prepared: &Prepared) -> Vec<LightTexel> {
     numbers
 }
 
-/// Returns the numbers of `Face` about the light of a sheet.
+/// Returns the words of `Face` about the light of a patch.
 pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBERS] {
     let mut numbers = [0; FACE_NUMBERS];
     let Some(baked) = &prepared.baked else { return numbers };
@@ -41,7 +41,7 @@ pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBER
     numbers
 }
 
-/// Returns the cubes of all parts in a state; those of the room are not used.
+/// Returns the ambient cubes of all parts in a state; those of the room's parts are unused.
 pub(super) fn part_cubes(baked: &BakedLight, prepared: &Prepared, placed: &PlacedScenery) -> Vec<LightCube> {
     let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
     parts

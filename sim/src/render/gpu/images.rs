@@ -1,4 +1,4 @@
-//! Images on surfaces, as a device's memory has them.
+//! Layout of surface images in GPU memory.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::render::scene::prepared::Prepared;
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::Affine;
 
-/// Count of numbers in `picture.wgsl`'s `Coordinates`, and in the head of an image.
+/// Number of words in `picture.wgsl`'s `Coordinates`, and in the head of an image.
 const COORDINATE_NUMBERS: usize = 12;
 const HEAD_NUMBERS: usize = 4;
 
@@ -17,14 +17,14 @@ const HEAD_NUMBERS: usize = 4;
 pub(super) struct SceneImages {
     /// `Coordinates` of each triangle; empty if no part has an image.
     pub coordinates: Vec<[u32; COORDINATE_NUMBERS]>,
-    /// Heads and texels of all images, after a number without meaning.
+    /// Heads and texels of all images, after one unused word.
     pub texels: Vec<u32>,
     pub heads: Vec<PartHeads>,
-    /// The same for the sky.
+    /// Index of the head of the sky's image.
     pub sky_head: u32,
 }
 
-/// Indices of the heads of a part's images in [`SceneImages::texels`]; 0 without one.
+/// Indices of the heads of a part's images in [`SceneImages::texels`]; 0 without an image.
 #[derive(Clone, Copy, Default)]
 pub(super) struct PartHeads {
     pub colour: u32,
@@ -33,7 +33,7 @@ pub(super) struct PartHeads {
     pub emitted: u32,
 }
 
-/// A texture, and true if its places are on a cube.
+/// A texture, and true if it is mapped to a cube.
 type PlacedTexture<'a> = (&'a Arc<Texture>, bool);
 
 impl SceneImages {

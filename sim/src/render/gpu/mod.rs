@@ -1,5 +1,5 @@
-//! The GPU renderer, by wgpu. It draws the same images as the embedded renderer, in the same steps: the
-//! triangle that each sample sees, then its colour. The two check each other.
+//! GPU renderer, based on wgpu. It draws the same images as the embedded renderer, in the same steps: the
+//! triangle that each sample sees, then its colour. Tests compare the two.
 
 mod baked;
 mod device;
@@ -47,16 +47,16 @@ pub(super) fn is_real() -> bool {
     *REAL.get_or_init(device::is_real)
 }
 
-/// Side of the squares of pixels that are resolved together.
+/// Side in pixels of the squares that are resolved together.
 const GROUP: u32 = 8;
 
-/// Renderer on a GPU; after a failure it draws on the calling thread.
+/// Renderer on a GPU. After a failure the embedded renderer takes over.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
     prepared: Arc<Prepared>,
     scene: SceneBuffers,
     shadow: ShadowMaps,
-    /// Poses of the parts in the device's memory, which the shadow also belongs to.
+    /// Poses of the parts in GPU memory, for which the shadow was also drawn.
     placed: Option<PlacedScenery>,
     contact: ContactMap,
     /// Targets of the last image's size.
@@ -66,8 +66,8 @@ pub struct GpuRenderer {
     embedded: Option<Box<dyn Renderer>>,
 }
 
-/// Opens the best device, once it has passed a test image. A process opens it once: that takes longer
-/// than many images.
+/// Opens the best device and checks it with a test image. A process does so once, since it takes longer than
+/// many images.
 fn open() -> Result<Arc<Gpu>, GpuError> {
     static OPENED: OnceLock<Result<Arc<Gpu>, GpuError>> = OnceLock::new();
     let opened = OPENED.get_or_init(|| {
@@ -171,8 +171,8 @@ impl GpuRenderer {
         pass.dispatch_workgroups(region.width.div_ceil(GROUP), region.height.div_ceil(GROUP), 1);
     }
 
-    /// Renders the image of each camera. Returns `None` if the device cannot, now or earlier, so that
-    /// the embedded renderer has to.
+    /// Renders the image of each camera. Returns `None` if the device fails or has failed before: the
+    /// embedded renderer has to draw then.
     fn draw(&mut self, step: &Step, cameras: &[Camera], wanted: Wanted) -> Option<Vec<Frame>> {
         if self.embedded.is_some() {
             return None;

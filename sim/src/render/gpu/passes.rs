@@ -31,7 +31,7 @@ pub(super) struct Passes {
     pub first_veils: RenderPipeline,
     pub next_veils: RenderPipeline,
     pub resolve: ComputePipeline,
-    /// These passes without depths and ids.
+    /// The same pass without depths and ids.
     pub resolve_colours: ComputePipeline,
 }
 

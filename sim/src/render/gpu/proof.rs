@@ -1,4 +1,4 @@
-//! A test image by which a renderer proves that it draws like the embedded one.
+//! Test image that checks that a device draws like the embedded renderer.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -9,7 +9,7 @@ use crate::render::{Camera, Carrier, Frame, Part, Pattern, PlacedScenery, Scener
 const SIDE_PX: u32 = 64;
 /// Maximum share of pixels with another id: on edges, renderers may decide differently.
 const STRAY_IDS: f32 = 0.02;
-/// Mean difference of colours, in steps of 255.
+/// Maximum mean difference of colours, in steps of 1/255.
 const MEAN_DIFFERENCE: f32 = 1.0;
 
 /// Returns a ball over a checkered floor, with its shadow.
@@ -47,7 +47,7 @@ pub fn camera() -> Camera {
     }
 }
 
-/// Returns true if another renderer's image of the scenery is right.
+/// Returns true if another renderer's image of the scenery matches.
 pub fn accepts(drawn: &Frame) -> bool {
     let expected = CpuRenderer::new(scenery()).draw_placed(placed(), &[camera()]).swap_remove(0);
     let count = expected.ids.len() as f32;

@@ -1,4 +1,4 @@
-//! A scenery in a device's memory, and its poses in one state.
+//! A scenery in GPU memory, and its poses in one state.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -17,12 +17,12 @@ use crate::render::shading::power::linear_value;
 use crate::render::shading::{CONTACT_TEXELS, SAMPLES, TEXELS, VEILS, normal_offset_m, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 
-/// Count of vectors of `picture.wgsl`'s `View` before its counts.
+/// Number of vectors in `picture.wgsl`'s `View` before its counts.
 const CAMERA_VECTORS: usize = 16;
-/// Count of numbers in `View`, and in `Part`.
+/// Number of words in `View`, and in `Part`.
 const VIEW_NUMBERS: usize = 4 * CAMERA_VECTORS + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
 const PART_NUMBERS: usize = 36;
-/// Count of numbers in its `Lamp`.
+/// Number of words in `Lamp`.
 const LAMP_NUMBERS: usize = 36;
 /// Bits of `Part`'s flags.
 const CASTS_SHADOW: u32 = 1;
@@ -30,7 +30,7 @@ const IS_VEIL: u32 = 2;
 const IS_CUT_OUT: u32 = 4;
 const HAS_ALPHA: u32 = 8;
 
-/// Group 0 of `picture.wgsl`, once for each view that is drawn at the same time.
+/// Bind group 0 of `picture.wgsl`, once for each view that is drawn at the same time.
 pub(super) struct SceneBuffers {
     corner_numbers: Buffer,
     faces: Buffer,
@@ -129,7 +129,7 @@ impl SceneBuffers {
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
 
-    /// Sets the camera of the view with this number, which exists or is the next.
+    /// Sets the camera of the view `view`, which is an existing index or the next one.
     pub(super) fn look(
         &mut self,
         gpu: &Gpu,
@@ -190,10 +190,10 @@ impl SceneBuffers {
     }
 }
 
-/// Index of the lamp that casts a shadow, in `View`.
+/// Index of the word in `View` for the lamp whose shadow is drawn.
 const CASTER: usize = 67;
 
-/// Returns the numbers of `View` from `extra` to the headlight.
+/// Returns the vectors of `View` from `extra` to the headlight.
 fn lighting(prepared: &Prepared) -> [[f32; 4]; 4] {
     let Scenery { lamps, focus_radius_m, .. } = &prepared.scenery;
     let head = lamps.as_ref().map(|lamps| lamps.headlight).unwrap_or_default();
@@ -242,7 +242,7 @@ fn initialised(gpu: &Gpu, numbers: &[u32], usage: BufferUsages) -> Buffer {
     gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
 }
 
-/// Returns three corners a triangle, with the number of their part.
+/// Returns three corners per triangle, with the index of their part.
 fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
     part.mesh.triangles.iter().flatten().map(move |corner| {
         let Vector { x, y, z } = part.mesh.vertices[*corner as usize].position_m;

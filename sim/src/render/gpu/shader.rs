@@ -1,4 +1,4 @@
-//! The shader's text: the constants that renderers share, written out, then those of `shaders/`.
+//! Source of the shaders: the constants that renderers share, then the files of `shaders/`.
 
 use rapier3d::math::Vector;
 
@@ -19,7 +19,7 @@ use crate::render::shading::{
     OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN_DISTANCE_M, TEXELS,
 };
 
-/// Texts after the constants.
+/// Shader sources after the constants.
 const SHADERS: [&str; 5] = [
     include_str!("shaders/picture.wgsl"),
     include_str!("shaders/shadows.wgsl"),

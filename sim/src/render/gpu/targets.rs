@@ -29,16 +29,16 @@ pub(super) struct Targets {
     drawn: Buffer,
     pub samples: Attachments,
     pub centres: Attachments,
-    /// Layers of blended surfaces at samples and at centres; empty without such parts.
+    /// Layers of blended surfaces at samples and at centres; empty if no part is blended.
     pub veils: [Vec<VeilAttachments>; 2],
-    /// Group 1 of `picture.wgsl`, with the first image in the buffer.
+    /// Bind group 1 of `picture.wgsl`, with the first image in the buffer.
     pub group: BindGroup,
 }
 
 /// One layer of blended surfaces.
 pub(super) struct VeilAttachments {
     pub attachments: Attachments,
-    /// Group 2 of `picture.wgsl`.
+    /// Bind group 2 of `picture.wgsl`.
     pub peel: BindGroup,
 }
 
@@ -97,7 +97,7 @@ impl Targets {
         Targets { width, height, bytes, drawn: drawn.clone(), samples, centres, veils, group }
     }
 
-    /// Returns true if such images can be drawn into these targets.
+    /// Returns true if images of this size can be drawn into these targets.
     pub(super) fn fit(&self, size_px: [u32; 2], bytes: u64, drawn: &Buffer) -> bool {
         ([self.width, self.height], self.bytes) == (size_px, bytes) && self.drawn == *drawn
     }
@@ -112,21 +112,21 @@ pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), Gpu
     Ok(())
 }
 
-/// Maps of shadows: all layers together, and each layer alone.
+/// Shadow maps: all layers together, and each layer alone.
 pub(super) struct ShadowMaps {
     pub all: TextureView,
     pub layers: Vec<TextureView>,
 }
 
-/// Creates the maps of shadows.
+/// Creates the shadow maps.
 pub(super) fn shadow_maps(gpu: &Gpu, layers: u32) -> ShadowMaps {
     let texture = texture(gpu, DEPTH, TEXELS as u32, TEXELS as u32, layers);
     let layers = (0..layers).map(|number| one_layer(&texture, number)).collect();
     ShadowMaps { all: array(&texture), layers }
 }
 
-/// Creates layers of blended surfaces in front of solid ones. Returns them, and all of their triangles; one
-/// texel without a layer.
+/// Creates layers of blended surfaces in front of solid ones. Returns the layers, and all of their triangle
+/// numbers, which are one texel if there is no layer.
 fn veil_layers(
     gpu: &Gpu,
     solid: &Attachments,
@@ -157,7 +157,7 @@ fn one_layer(texture: &Texture, number: u32) -> TextureView {
     })
 }
 
-/// Returns a view of all layers of a texture, for example of a single one.
+/// Returns an array view of all layers of a texture, even of a single one.
 fn array(texture: &Texture) -> TextureView {
     let dimension = Some(TextureViewDimension::D2Array);
     texture.create_view(&TextureViewDescriptor { dimension, ..TextureViewDescriptor::default() })

@@ -1,5 +1,5 @@
-//! The GPU renderer draws the same images as the embedded one. Software such as Mesa's is sufficient;
-//! without any, these tests report it and pass.
+//! The GPU renderer draws the same images as the embedded one. A software driver such as Mesa's is
+//! sufficient; without any driver, these tests report that and pass.
 
 use super::together::counts;
 use crate::mjcf::Document;
@@ -16,10 +16,10 @@ use skipped::skipped;
 
 const MIN_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
-/// Maximum share of pixels that may show another thing.
+/// Maximum share of pixels that may have another id.
 const STRAY_IDS: f64 = 0.002;
 
-/// Returns a renderer, or `None` with a message if images are drawn by the embedded renderer anyway.
+/// Returns a GPU renderer. Prints a message and returns `None` if the embedded renderer would draw instead.
 fn gpu(scenery: Scenery) -> Option<Box<dyn Renderer>> {
     let renderer = RendererKind::Gpu.renderer(scenery);
     let found = renderer.name() != RendererKind::Cpu.name();
@@ -81,7 +81,7 @@ fn both_renderers_draw_the_same() {
 
 /// A kitchen with images on meshes.
 const KITCHEN: &str = concat!(env!("TANDEM_SIM_ASSETS"), "/../../episodes/tests/scenes/kitchen");
-/// The image of its floor, along z and on cubes.
+/// Shapes with the image of the kitchen's floor, mapped along z and on cubes.
 const SHAPES: &str = r#"<asset>
         <texture name="flat" type="2d" file="kitchen_floor_floor_texture.png"/>
         <texture name="cube" type="cube" file="kitchen_floor_floor_texture.png"/>

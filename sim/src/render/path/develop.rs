@@ -1,4 +1,4 @@
-//! Conversion of light to the colours of an image: surfaces' own colours, smooth edges, exposure and tones.
+//! Conversion of light to the colours of an image: surface colours, smooth edges, exposure and tone mapping.
 
 use rapier3d::math::Vector;
 
@@ -12,7 +12,7 @@ const WHITE_VALUE: f32 = 3.0;
 /// Minimum likeness of surfaces that share their light.
 const ALIKE: f32 = 0.7;
 
-/// The light of an image, filtered.
+/// Filtered light of an image, before exposure.
 pub struct Negative<'a> {
     pub view: PathView<'a>,
     pub depth_m: Vec<f32>,
@@ -39,10 +39,10 @@ impl Negative<'_> {
         sum_rgb / around.len() as f32
     }
 
-    /// Returns the linear colour of a surface in a pixel, in the light of the pixel about it that shows it
-    /// best.
+    /// Returns the linear colour of a surface in a pixel, lit like the most similar surface at or around the
+    /// pixel.
     fn seen_rgb(&self, row: usize, column: usize, seen: &SeenSurface) -> Vector {
-        // Even little light gives a better image than no light.
+        // Any surface ranks above the background, since even little light gives a better image than no light.
         let rank = |there: usize| match &self.guides[there] {
             SeenSurface { id: 0, .. } => -1.0,
             guide => seen.likeness(guide),
@@ -69,7 +69,7 @@ impl Negative<'_> {
     }
 }
 
-/// Returns the linear colour of a surface in an image.
+/// Returns the linear colour of a surface under these layers of light.
 pub fn developed_rgb(seen: &SeenSurface, layers_rgb: [Vector; LAYERS], exposure_factor: f32) -> Vector {
     let light_rgb = seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT] * seen.gloss.ambient_factor)
         + layers_rgb[COATED] * seen.coat_rgb();

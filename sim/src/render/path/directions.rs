@@ -5,14 +5,14 @@ use std::f32::consts::FRAC_PI_2;
 
 use rapier3d::math::Vector;
 
-/// Returns a direction with a density in proportion to its cosine to a normal.
+/// Samples a direction about a normal. The density is proportional to the cosine to the normal.
 pub fn cosine_about(normal: Vector, [u, v]: [f32; 2]) -> Vector {
     let (radius, [cosine, sine]) = (u.sqrt(), circle(v));
     let [right, ahead] = across(normal);
     (right * (radius * cosine) + ahead * (radius * sine) + normal * (1.0 - u).sqrt()).normalize()
 }
 
-/// Returns a facet's normal by the density of the GGX distribution, times the cosine to the normal.
+/// Samples the normal of a facet. The density is the GGX distribution times the cosine to the normal.
 /// Source: Walter et al. 2007, equation 35.
 pub fn facet_about(normal: Vector, width_2_ratio: f32, [u, v]: [f32; 2]) -> Vector {
     let cosine_2 = (1.0 - u) / (1.0 + (width_2_ratio - 1.0) * u);
@@ -21,7 +21,7 @@ pub fn facet_about(normal: Vector, width_2_ratio: f32, [u, v]: [f32; 2]) -> Vect
     (right * (radius * cosine) + ahead * (radius * sine) + normal * cosine_2.sqrt()).normalize()
 }
 
-/// Returns two axes perpendicular to a normal and each other.
+/// Returns two axes perpendicular to a normal and to each other.
 /// Source: Duff et al. 2017, Building an orthonormal basis, revisited.
 pub fn across(normal: Vector) -> [Vector; 2] {
     let sign = 1f32.copysign(normal.z);
@@ -33,7 +33,7 @@ pub fn across(normal: Vector) -> [Vector; 2] {
     ]
 }
 
-/// Returns the point of the unit circle at a share of a turn, counted from some angle.
+/// Returns the point of the unit circle at a share of a turn, counted from an unspecified angle.
 pub fn circle(turn_share: f32) -> [f32; 2] {
     let quarters = turn_share * 4.0;
     let quarter = (quarters as u32).min(3);
@@ -53,7 +53,7 @@ pub fn circle(turn_share: f32) -> [f32; 2] {
 mod tests {
     use super::*;
 
-    /// Returns the middles of a grid's cells in the unit square.
+    /// Returns the centres of a grid's cells in the unit square.
     fn grid() -> impl Iterator<Item = [f32; 2]> {
         (0..64).flat_map(|u| (0..64).map(move |v| [(u as f32 + 0.5) / 64.0, (v as f32 + 0.5) / 64.0]))
     }

@@ -1,4 +1,4 @@
-//! Automatic exposure: an image is as bright, on the whole, as one by the rasterisers.
+//! Automatic exposure: the mean brightness of an image matches that of the rasterisers.
 
 use rapier3d::math::Vector;
 

@@ -1,5 +1,5 @@
-//! Filter against the noise of few paths, which keeps the edges of surfaces: each pass averages a pixel with
-//! eight others on the same surface, twice as far away as in the pass before.
+//! Edge-preserving filter against the noise of few paths. Each pass averages a pixel with eight others on the
+//! same surface, at twice the distance of the previous pass.
 //!
 //! Source: Dammertz et al. 2010, Edge-avoiding a-trous wavelet transform. Differences of light have no
 //! weight here: with few paths they are noise, and pixels that differ from all around them would remain.
@@ -10,8 +10,8 @@ use super::rows::for_each_row;
 use super::scene::{COATED, DIRECT, INDIRECT, LAYERS};
 use super::view::SeenSurface;
 
-/// Number of passes for each layer: the smoother the light, the more. Shadows of lamps have the sharpest
-/// edges, and the least noise.
+/// Number of passes for each layer: smoother light gets more. Shadows of lamps have the sharpest edges, and
+/// the least noise.
 const PASSES: [usize; LAYERS] = {
     let mut passes = [0; LAYERS];
     passes[DIRECT] = 2;
@@ -22,7 +22,7 @@ const PASSES: [usize; LAYERS] = {
 /// Weights of a pixel and its neighbours along one axis.
 const KERNEL: [f32; 3] = [0.25, 0.5, 0.25];
 
-/// Returns the layers of light at each pixel, averaged over the neighbours on its surface.
+/// Returns the layers of light at each pixel, averaged over neighbours on the same surface.
 pub fn filtered(
     mut light_rgb: Vec<[Vector; LAYERS]>,
     guides: &[SeenSurface],

@@ -14,18 +14,18 @@ use crate::render::scene::prepared::Prepared;
 use crate::render::shading::baked::SurfacePoint;
 use crate::render::{PlacedScenery, Scenery};
 
-/// Numbers of paths and of points of lamps for each point.
+/// Number of paths per point, and number of sampled points on lamps.
 const PATHS: SampleCount = SampleCount(64);
 const LAMP_POINTS: SampleCount = SampleCount(32);
-/// Number of rays that decide if a point is inside of an object, and the share that may meet a surface from
-/// inside.
+/// Number of rays that decide if a point is inside an object. For a point outside, at most this share of them
+/// may hit a back face first.
 const INSIDE_RAYS: SampleCount = SampleCount(16);
 const MAX_INSIDE_SHARE: f32 = 0.3;
-/// Distance from a surface at which rays leave it.
+/// Distance from a surface at which rays that leave it start.
 const OFF_M: f32 = 1e-3;
 /// Number of points that a thread processes as one batch.
 const ROW: usize = 64;
-/// Purposes of a point's numbers.
+/// Purposes of a point's random numbers.
 const FOR_INSIDE: u32 = 0;
 const FOR_LAMPS: u32 = 1;
 const FOR_LIGHT: u32 = 2;
@@ -35,7 +35,7 @@ const FOR_LIGHT: u32 = 2;
 pub struct Irradiance {
     pub of_lamps_rgb: Vector,
     pub reflected_rgb: Vector,
-    /// True if the point is inside of an object, where light does not count.
+    /// True if the point is inside an object, where light does not count.
     pub is_inside: bool,
 }
 
@@ -77,7 +77,7 @@ fn at_point(scene: &Scene, SurfacePoint { point_m, normal, seed }: &SurfacePoint
     }
 }
 
-/// Returns true if the surfaces around a point face away from the point.
+/// Returns true if too many of the surfaces around a point face away from it.
 fn is_inside(scene: &Scene, start_m: Vector, normal: Vector, seed: PixelSeed) -> bool {
     let meets_back = |sample: &u32| {
         let direction = cosine_about(normal, seed.spread(FOR_INSIDE, *sample, INSIDE_RAYS));

@@ -10,10 +10,10 @@ use crate::mjcf::{FileLight, Headlight, LightKind};
 use crate::render::shading::lamps::{arriving, linear_light};
 use crate::render::{Carrier, Lamps, Light, PlacedScenery, Scenery};
 
-/// Half of the sides of a lamp, which faces down, and its greatest height.
+/// Half extents of a lamp, which faces down, and its maximum height.
 const LAMP_HALF_M: [f32; 2] = [0.9, 0.6];
 const LAMP_HEIGHT_M: f32 = 2.75;
-/// Height at which lamps shine from the direction of [`Light::sun_direction`].
+/// Height at which the light of the lamps comes from [`Light::sun_direction`].
 const TABLE_HEIGHT_M: f32 = 0.8;
 /// Distance of lamps from a ceiling, and minimum height of a ceiling.
 const CEILING_GAP_M: f32 = 0.02;
@@ -29,7 +29,7 @@ const MAX_ROOM_M: f32 = 40.0;
 /// exposed for the room.
 const LAMP_GAIN: f32 = 10.0;
 const SKY_GAIN: f32 = 1.75;
-/// Tangent of the sun's radius; larger than the real one, as on a day with thin clouds.
+/// Tangent of the sun's angular radius; larger than in reality, as on a day with thin clouds.
 const SUN_RADIUS_TAN: f32 = 0.03;
 
 /// The light of a scenery.
@@ -41,7 +41,7 @@ pub struct Lights {
 
 #[derive(Clone)]
 enum Sources {
-    /// Middles of the lamps.
+    /// Centres of the lamps.
     Lamps(Vec<Vector>),
     Sun,
     /// Lights of the scene's file, and its headlight.
@@ -66,7 +66,7 @@ impl Lights {
         Lights { sources, light }
     }
 
-    /// Returns the light of a state: lights of a file may move.
+    /// Returns the lights at their poses in a state. Only lights of a file can move.
     pub fn placed(&self, lamps: Option<&Lamps>, placed: &PlacedScenery) -> Lights {
         match lamps {
             None => self.clone(),
@@ -102,7 +102,7 @@ impl Lights {
         if direction.z > 0.0 { above_rgb * SKY_GAIN } else { below_rgb }
     }
 
-    /// Draws a point of a source for a point to be lit.
+    /// Samples a point of a source that may light `point_m`.
     pub fn beam(&self, point_m: Vector, [u, v]: [f32; 2]) -> Beam {
         match &self.sources {
             Sources::Lamps(lamps_m) => self.lamp_beam(lamps_m, point_m, [u, v]),
@@ -117,8 +117,8 @@ impl Lights {
         }
     }
 
-    /// Draws a lamp, and then a point on that lamp. The probability of a lamp is proportional to the inverse
-    /// fourth power of its distance, and so, roughly, is its light.
+    /// Samples a lamp, and then a point on that lamp. The probability of a lamp is proportional to the
+    /// inverse fourth power of its distance, which is roughly proportional to its light.
     fn lamp_beam(&self, lamps_m: &[Vector], point_m: Vector, [u, v]: [f32; 2]) -> Beam {
         let weight = |lamp_m: &Vector| 1.0 / lamp_m.distance_squared(point_m).powi(2).max(1e-3);
         let sum = lamps_m.iter().map(weight).sum::<f32>();
@@ -140,7 +140,7 @@ impl Lights {
     }
 }
 
-/// Draws a light of a file in proportion to its light at a point.
+/// Samples a light of a file, with a probability proportional to its light at a point.
 fn stated_beam(lights: &[FileLight], point_m: Vector, draw_value: f32) -> Beam {
     let weight = |light: &FileLight| light.diffuse_rgb.element_sum() * arriving(light, point_m).2;
     let sum = lights.iter().map(weight).sum::<f32>();
@@ -162,7 +162,8 @@ fn stated_beam(lights: &[FileLight], point_m: Vector, draw_value: f32) -> Beam {
     Beam { direction: Vector::Z, reach_m: 0.0, rgb: Vector::ZERO }
 }
 
-/// Returns the box around the walls of a room and all other parts of that height; `None` in the open.
+/// Returns the bounding box of the walls and all other parts of the room of that height. Returns `None`
+/// outdoors.
 pub fn walls_m(scenery: &Scenery) -> Option<[Vector; 2]> {
     let mut box_m = None;
     for part in scenery.parts.iter().filter(|part| part.carrier == Carrier::Room) {
@@ -180,7 +181,7 @@ pub fn walls_m(scenery: &Scenery) -> Option<[Vector; 2]> {
     box_m
 }
 
-/// Returns the places of a room's lamps: a grid in the middle, shifted towards the sun's direction.
+/// Returns the positions of a room's lamps: a grid in the middle, shifted towards the sun's direction.
 fn lamps_m([low_m, high_m]: [Vector; 2], sun_direction: Vector, room: &Body) -> Vec<Vector> {
     let count = |extent_m: f32| ((extent_m / LAMP_PITCH_M).round() as usize).clamp(1, MAX_LAMPS_A_SIDE);
     let size_m = high_m - low_m;
@@ -200,7 +201,7 @@ fn lamps_m([low_m, high_m]: [Vector; 2], sun_direction: Vector, room: &Body) -> 
         .collect()
 }
 
-/// Returns the height below the ceiling at a place; infinity without one.
+/// Returns the maximum height of a lamp below the ceiling at a place; infinity without a ceiling.
 fn ceiling_m(room: &Body, place_m: Vector) -> f32 {
     let from_m = Vector::new(place_m.x, place_m.y, CEILING_FROM_M);
     let (origin_m, direction) = (from_m.into(), Vector::Z.into());

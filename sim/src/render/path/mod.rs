@@ -1,8 +1,8 @@
 //! Path tracing on the processor: light that bounces, soft shadows, and reflections in a clear coat.
 //!
-//! [`Space`] answers where rays meet the scenery, [`Scene`] how much light comes along them, [`PathView`]
-//! looks and lights pixel by pixel, [`filtered`] removes the noise of few paths, and [`Negative`] turns
-//! light to colours. An image is the same bit for bit on any number of threads.
+//! [`Space`] finds where rays meet the scenery, and [`Scene`] computes the light along them. [`PathView`]
+//! finds and lights the surface of each pixel, [`filtered`] removes the noise of few paths, and [`Negative`]
+//! converts light to colours. An image is the same bit for bit on any number of threads.
 
 mod develop;
 mod directions;
@@ -85,7 +85,7 @@ impl PathRenderer {
         PathRenderer { room, movers, veils, no_room, lights, paths: PATHS, srgb, prepared }
     }
 
-    /// Returns the scenery at its poses.
+    /// Returns the scenery at these poses.
     fn scene(&self, placed: &PlacedScenery) -> Scene<'_> {
         Scene {
             space: space(&self.room, &self.movers, placed),

@@ -4,8 +4,8 @@ use std::panic::resume_unwind;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-/// Calls `draw` for each row of `width` values, with its number, on `threads` threads. Each takes the next
-/// row that is left, so `draw` must not depend on the order.
+/// Calls `draw` with the index and the values of each row of `width` values, on `threads` threads. Each
+/// thread takes the next row that is left, so `draw` must not depend on the order.
 pub fn for_each_row<T: Send>(
     values: &mut [T],
     width: usize,

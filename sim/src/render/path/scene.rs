@@ -17,22 +17,21 @@ use crate::render::{Pattern, PlacedScenery};
 
 /// Maximum number of surfaces that reflect light on a path, after the visible one.
 const MAX_BOUNCES: u32 = 4;
-/// Number of bounces after which a path may end early, by chance, and the maximum probability that it goes
-/// on.
+/// Number of bounces after which a path may end at random, and its maximum probability of continuing.
 const SURE_BOUNCES: u32 = 1;
 const MAX_SURVIVAL: f32 = 0.9;
-/// Limit of the light that a path brings: more would be a bright speck.
+/// Upper limit on the light of a path. Brighter paths would appear as specks.
 const MAX_PATH_VALUE: f32 = 6.0;
-/// Reflectance of the clear coat over all surfaces, looked at along the normal, and the square of the width
-/// of the distribution of its facets.
+/// Reflectance of the clear coat over all surfaces at normal incidence, and the squared width of the
+/// distribution of its facets.
 const COAT: f32 = 0.04;
 const COAT_WIDTH_2: f32 = 0.015;
-/// Minimum roughness: smoother surfaces would show single paths.
+/// Minimum roughness: on smoother surfaces, single paths would be visible.
 const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
-/// Minimum cosine between the normal of a mirror and its mesh's z.
+/// Minimum cosine between the normal of a mirror and the z axis of its mesh.
 const MIN_MIRROR_COSINE: f32 = 0.999;
-/// Width of the spots over which the images of reflecting surfaces are averaged.
+/// Width over which images on surfaces that reflect light on a path are averaged.
 const REFLECTED_WIDTH_M: f32 = 0.02;
 
 /// A state of a scenery, ready to be traced.
@@ -40,26 +39,27 @@ pub struct Scene<'a> {
     pub space: Space<'a>,
     pub prepared: &'a Prepared,
     pub lights: Lights,
-    /// Blended surfaces, through which light goes.
+    /// Blended surfaces, through which light passes.
     pub veils: Option<Space<'a>>,
     /// Map from the world to the frame of each part's pattern, or to the coordinates of its image.
     pub patterns: Vec<Affine>,
-    /// Direction of z in the mesh of each part.
+    /// Direction of the z axis of each part's mesh.
     pub upward_direction: Vec<Vector>,
 }
 
-/// Reflection of a surface, beyond its colour.
+/// Specular reflection of a surface.
 #[derive(Clone, Copy)]
 pub struct Coat {
-    /// Reflectance along the normal.
+    /// Reflectance at normal incidence.
     base_share: f32,
     /// Square of the width of the distribution of facets.
     width_2_ratio: f32,
 }
 
-/// Layers of the light at a seen point. They are filtered separately.
+/// Number of layers of the light at a visible point. Layers are filtered separately.
 pub const LAYERS: usize = 3;
-/// Light of the lamps, other light (both without the surface's colour), and the reflection in its coat.
+/// Indices of the layers: direct light of lamps, other light (both without the surface's colour), and the
+/// reflection in its coat.
 pub const DIRECT: usize = 0;
 pub const INDIRECT: usize = 1;
 pub const COATED: usize = 2;
@@ -71,7 +71,8 @@ pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
 }
 
 impl Coat {
-    /// Returns the clear coat of a surface without its own gloss; otherwise a rougher coat, or metal.
+    /// Returns the coat of a surface: the clear coat if the surface has no gloss of its own, otherwise a
+    /// rougher coat, or metal.
     pub fn of(gloss: &Gloss) -> Coat {
         let width_2_ratio = gloss.roughness_factor.map_or(COAT_WIDTH_2, |roughness| {
             let squared = roughness.clamp(MIN_COAT_ROUGHNESS, 1.0) * roughness.clamp(MIN_COAT_ROUGHNESS, 1.0);
@@ -88,7 +89,7 @@ impl Coat {
 }
 
 impl Scene<'_> {
-    /// Returns the linear colour of a surface, without light, as a mean over about `width_m`.
+    /// Returns the linear colour of a surface, without light, averaged over about `width_m`.
     pub fn albedo(&self, spot: &Spot, width_m: f32) -> Vector {
         self.albedo_and_alpha(spot, width_m).0
     }
@@ -112,7 +113,7 @@ impl Scene<'_> {
         (rgb, 1.0)
     }
 
-    /// Returns the colour of the image on a surface of the colour `albedo`; 1 without.
+    /// Returns the colour of the image on a surface of the colour `albedo`; 1 without an image.
     pub fn texture_rgb(&self, spot: &Spot, albedo: Vector) -> Vector {
         let part = spot.part as usize;
         match self.prepared.images[part] {
@@ -133,7 +134,7 @@ impl Scene<'_> {
         image.place(map.map(spot.point_m), by(across), by(spot.face_normal.cross(across)))
     }
 
-    /// Returns the gloss of a surface and the light that a layer emits, as means over about `width_m`.
+    /// Returns the gloss of a surface and the light that a layer emits, averaged over about `width_m`.
     pub fn gloss_and_emitted_rgb(&self, spot: &Spot, width_m: f32) -> (Gloss, Vector) {
         let mut gloss = self.prepared.scenery.parts[spot.part as usize].gloss;
         let image = self.prepared.images[spot.part as usize].as_ref();
@@ -155,7 +156,7 @@ impl Scene<'_> {
         if share > 0.0 && is_upper() { share } else { 0.0 }
     }
 
-    /// Returns a surface with the normal of its relief, as a mean over about `width_m`.
+    /// Returns a surface with the normal of its relief, averaged over about `width_m`.
     pub fn with_relief(&self, spot: Spot, eye_direction: Vector, width_m: f32) -> Spot {
         let Some(image @ Image { relief: Some(texture), .. }) = &self.prepared.images[spot.part as usize]
         else {
@@ -172,7 +173,7 @@ impl Scene<'_> {
         Spot { normal: bent_normal(spot.normal, eye_direction, gradients, numbers), ..spot }
     }
 
-    /// Adds the light of one point of a lamp to the layers of a seen point.
+    /// Adds the light of one point of a lamp to the layers of a visible point.
     pub fn light_directly(
         &self,
         spot: &Spot,
@@ -195,8 +196,9 @@ impl Scene<'_> {
         layers_rgb[COATED] += lit_rgb * (PI * density * reflected * 0.25);
     }
 
-    /// Adds the light of one path to the layers of a seen point: through the coat and, if `coated`, that
-    /// which the coat reflects.
+    /// Adds the light of one path through the coat to the layers of a visible point. It may also add the
+    /// light of one path that the coat reflects. `through` and `mirrored` are the random numbers for the
+    /// directions of these paths.
     pub fn light_indirectly(
         &self,
         spot: &Spot,
@@ -223,8 +225,8 @@ impl Scene<'_> {
         }
     }
 
-    /// Returns the light of one path that arrives at a point from a direction. Reflections in the coats of
-    /// surfaces on the way are left out, but not the light that coats keep out.
+    /// Returns the light of one path that reaches a point from a direction. Coats of surfaces on the path
+    /// block light, but their reflections are neglected.
     pub fn arriving_rgb(
         &self,
         mut start_m: Vector,

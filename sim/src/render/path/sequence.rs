@@ -1,14 +1,15 @@
-//! Numbers of a pixel's samples. They depend on the pixel alone, so an image is the same on any number of
-//! threads; and those of neighbouring pixels complement each other, so that the filter averages them well.
+//! Random numbers for a pixel's samples. They depend on the pixel alone, so an image is the same on any
+//! number of threads. The numbers of neighbouring pixels complement each other, so that the filter averages
+//! them well.
 
 /// Side of a tile of pixels whose samples together cover the unit square evenly; a power of two.
 const TILE_PX: u32 = 8;
 
-/// Number of all samples of a pixel; a power of two, so that they are evenly spread.
+/// Total number of samples of a pixel; a power of two, so that they are evenly spread.
 #[derive(Clone, Copy)]
 pub struct SampleCount(pub u32);
 
-/// The place of a pixel: its tile, and its number there.
+/// Position of a pixel: its tile, and its index in the tile.
 #[derive(Clone, Copy)]
 pub struct PixelSeed {
     tile: u32,

@@ -13,12 +13,12 @@ use crate::render::{Cameras, Light, cpu};
 use crate::{Step, World};
 
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
-/// Maximum share of pixels that may show another thing than the embedded renderer's.
+/// Maximum share of pixels whose id may differ from the embedded renderer's.
 const STRAY_IDS: f64 = 0.002;
 /// Maximum relative difference of mean brightness from the embedded renderer's.
 const BRIGHTNESS_SHARE: f64 = 0.1;
 const MIN_PSNR_DB: f64 = 32.0;
-/// Paths at a pixel of the reference, and the distance between the rows of pixels that it covers.
+/// Paths per pixel of the reference, and the distance between the rows of pixels that it covers.
 const REFERENCE_PATHS: u32 = 512;
 const REFERENCE_ROWS: usize = 27;
 
@@ -85,7 +85,7 @@ fn images_are_as_bright_as_those_of_the_embedded_renderer() {
 fn red_wall() -> (Scenery, Camera) {
     let floor = cuboid(Vector::new(3.0, 3.0, 0.05), Vector::new(0.0, 0.0, -0.05), [0.6, 0.6, 0.6]);
     let wall = cuboid(Vector::new(0.05, 3.0, 1.2), Vector::new(1.5, 0.0, 1.2), [0.9, 0.1, 0.1]);
-    // White, so that all colour is from the wall, and faint, so that no tone is compressed.
+    // The light is white, so that all colour is from the wall, and faint, so that no tone is compressed.
     let faint_rgb = Vector::splat(0.4);
     let light = Light { sun_rgb: faint_rgb, below_rgb: faint_rgb, above_rgb: faint_rgb, ..Light::default() };
     let down = Pose::from_translation(Vector::new(0.0, 0.0, 2.0));
@@ -114,7 +114,7 @@ fn a_red_wall_colours_the_floor_beside_it() {
     assert!((beside - away).abs() < 0.01, "without light that bounces: {beside} and {away}");
 }
 
-/// Returns some rows of an image of many paths through random points of each pixel, unfiltered.
+/// Renders some rows of an unfiltered image, with many paths through random points of each pixel.
 fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> {
     let width = camera.width as usize;
     let mut rgb = vec![0; camera.height as usize / REFERENCE_ROWS * width * 3];

@@ -15,24 +15,24 @@ use crate::render::shading::power::blended;
 use crate::render::shading::{LAMP, MIN_SEEN_ALPHA, SAMPLES, SKY, VEILS, opacity};
 use crate::render::{Camera, Intrinsics, Scenery};
 
-/// Points of a lamp to which each path of a pixel looks.
+/// Number of sampled points on lamps for each path of a pixel.
 const LAMP_POINTS: u32 = 2;
-/// Minimum distance of a point from the plane of a surface at which it belongs to another surface. It is a
-/// share of the distance along the surface, and at least `MIN_ASIDE_M`.
+/// Distance from the plane of a surface at which a point belongs to another surface: this share of the
+/// distance between both points, plus `MIN_ASIDE_M`.
 const ASIDE_SHARE: f32 = 0.15;
 const MIN_ASIDE_M: f32 = 0.002;
-/// Share of the surfaces towards the rasterisers' sun that it reaches.
+/// Share of the surfaces facing the rasterisers' sun that it lights.
 const SUNLIT_SHARE: f32 = 0.92;
-/// Distance between blended surfaces on a ray, as a share of the distance on it.
+/// Minimum distance between blended surfaces on a ray, as a share of the distance along the ray.
 const MIN_STEP_SHARE: f32 = 1e-5;
-/// Distance from a mirror at which rays start that leave it.
+/// Distance from a mirror at which reflected rays start.
 const OFF_MIRROR_M: f32 = 1e-3;
-/// Purposes of a pixel's numbers.
+/// Purposes of a pixel's random numbers.
 const FOR_LAMPS: u32 = 0;
 const FOR_LIGHT: u32 = 1;
 const FOR_COAT: u32 = 2;
 
-/// A seen surface.
+/// Surface that is visible at a point of the image.
 #[derive(Clone, Copy, Default)]
 pub struct SeenSurface {
     /// Id in images; 0 for nothing.
@@ -40,9 +40,9 @@ pub struct SeenSurface {
     pub point_m: Vector,
     pub normal: Vector,
     pub albedo: Vector,
-    /// Colour of its image alone; 1 without.
+    /// Colour of its image alone; 1 without an image.
     pub texture_rgb: Vector,
-    /// Light that the surface emits by a layer, besides the emission of its gloss.
+    /// Light from a layer of emission, in addition to the emission of its gloss.
     pub emitted_rgb: Vector,
     pub gloss: Gloss,
     /// Share of the mirror image in its colour.
@@ -105,8 +105,8 @@ impl<'a> PathView<'a> {
         sky.sky_rgb(ray, steps.map(|step| self.world_from_camera.rotation * step))
     }
 
-    /// Returns the colour at a place in the image where blended surfaces are in front of `behind_rgb`, which
-    /// is seen at a depth.
+    /// Returns the colour at a place in the image where blended surfaces are in front of `behind_rgb`. That
+    /// colour is seen at the depth `depth_m`.
     pub fn veiled_rgb(&self, uv_px: [f32; 2], behind_rgb: Vector, depth_m: f32) -> Vector {
         let mut rgb = behind_rgb;
         for spot in self.veils(uv_px, depth_m).iter().rev() {
@@ -122,7 +122,7 @@ impl<'a> PathView<'a> {
         rgb
     }
 
-    /// Returns the linear colour of a surface in an image of a rasteriser, with the usual shadow.
+    /// Returns the linear colour of a surface in a rasteriser's image, with the usual share of shadow.
     pub fn rasterised_rgb(&self, seen: &SeenSurface) -> Vector {
         let SeenSurface { point_m, normal, albedo, texture_rgb, emitted_rgb, gloss, .. } = *seen;
         let Scenery { light, lamps, .. } = &self.scene.prepared.scenery;
@@ -152,8 +152,8 @@ impl<'a> PathView<'a> {
         (lit_rgb + emitted_rgb).min(Vector::ONE)
     }
 
-    /// Returns the colour of a surface with its mirror image, in which things look as in an image of a
-    /// rasteriser.
+    /// Returns the colour of a surface with its mirror image. Surfaces in the mirror have the colours of a
+    /// rasteriser's image.
     pub fn mirrored_rgb(&self, own_rgb: Vector, seen: &SeenSurface) -> Vector {
         if seen.mirror_share == 0.0 {
             return own_rgb;
@@ -205,12 +205,12 @@ impl<'a> PathView<'a> {
         }
     }
 
-    /// Returns the point that the camera looks from.
+    /// Returns the position of the camera.
     pub fn eye_m(&self) -> Vector {
         self.world_from_camera.translation
     }
 
-    /// Returns the direction from the visible point to the camera.
+    /// Returns the direction from the camera's target to the camera.
     pub fn back(&self) -> Vector {
         self.world_from_camera.rotation * Vector::Z
     }
@@ -220,8 +220,8 @@ impl<'a> PathView<'a> {
         self.world_from_camera.rotation * self.lens.unproject(uv_px, 1.0)
     }
 
-    /// Returns the surface at a point of the image and its depth. The centre of the first pixel is (0, 0).
-    /// Images with alpha cut holes into it.
+    /// Returns the surface at a point of the image, and its depth. The centre of the first pixel is (0, 0).
+    /// Holes that an image's alpha cuts into surfaces are passed.
     pub fn spot(&self, uv_px: [f32; 2]) -> Option<(f32, Spot)> {
         let (eye_m, ray) = (self.eye_m(), self.ray(uv_px));
         let solid = self.scene.space.nearest(eye_m, ray, NEAR_M, MetSides::Front);
@@ -260,12 +260,13 @@ impl<'a> PathView<'a> {
 }
 
 impl SeenSurface {
-    /// Returns the colour in which a surface reflects white light. That of a metal is not white.
+    /// Returns the colour in which a surface reflects white light. For metals this is not white.
     pub fn coat_rgb(&self) -> Vector {
         Vector::ONE + (self.albedo - Vector::ONE) * self.gloss.metallic_factor
     }
 
-    /// Returns 1 for a point of the same surface, less for another, and 0 for that of another thing.
+    /// Returns the likeness of two surfaces: 1 for points of the same surface, less for other surfaces, and 0
+    /// for another id.
     pub fn likeness(&self, other: &SeenSurface) -> f32 {
         if self.id != other.id {
             return 0.0;
@@ -280,7 +281,7 @@ impl SeenSurface {
 }
 
 impl Scene<'_> {
-    /// Returns the light at a seen point, layer by layer.
+    /// Returns the light at a visible point, layer by layer.
     pub fn lit_layers(
         &self,
         spot: &Spot,

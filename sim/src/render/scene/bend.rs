@@ -1,4 +1,4 @@
-//! Orientation of a mesh's surface: triangles that continue each other smoothly share one bend.
+//! Normals of a mesh: adjacent triangles of one smooth surface share one linear function for their normals.
 
 use std::collections::HashMap;
 
@@ -6,12 +6,12 @@ use rapier3d::math::{Matrix, Vector};
 
 use crate::render::{TriangleMesh, Vertex};
 
-/// The normal at a point p of some triangles, in their mesh's frame and of any length:
-/// `normal + slope_1_m * p`.
+/// Linear function for the normals of some triangles. The normal at a point p, in the mesh's frame and of any
+/// length, is `normal + slope_1_m * p`.
 #[derive(Clone, Copy, Debug)]
 pub struct Bend {
     pub normal: Vector,
-    /// `None` if they are flat.
+    /// `None` for flat triangles.
     pub slope_1_m: Option<Matrix>,
 }
 
@@ -33,7 +33,7 @@ impl TriangleMesh {
     }
 }
 
-/// Bends of a mesh, indexed by their normals: a mesh of a file may have one for each triangle.
+/// Bends of a mesh, indexed by their normals: a mesh of a file may have one bend for each triangle.
 #[derive(Default)]
 struct Bends {
     all: Vec<Bend>,
@@ -94,9 +94,9 @@ impl Bend {
         Bend { normal: -(slope_1_m * middle), slope_1_m: Some(slope_1_m) }
     }
 
-    /// Returns the first bend that fits of these: a plane; a surface whose normals are linear in each
-    /// coordinate alone, such as spheres and cylinders along an axis; the whole mesh's ellipsoid.
-    /// Otherwise it returns the bend of these corners alone.
+    /// Returns the first of these bends that fits: a plane; a surface whose normals are linear in each
+    /// coordinate alone, such as a sphere or a cylinder along an axis; the whole mesh's ellipsoid. If none
+    /// fits, it returns the bend that interpolates the corners.
     fn of(corners: &[Vertex; 3], ellipsoid: Bend) -> Bend {
         let [a, b, c] = corners;
         let flat = Bend { normal: a.normal, slope_1_m: None };

@@ -1,4 +1,4 @@
-//! Pinhole cameras, and those of a world: one in each robot's head, one that sees all robots.
+//! Pinhole cameras, and the cameras of a world: one in each robot's head, and one that sees all robots.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -14,12 +14,11 @@ pub struct Camera {
     pub vertical_fov_rad: f32,
     pub width: u32,
     pub height: u32,
-    /// Blur of its colours: the standard deviation over which a point is spread, in pixels. Depth stays
-    /// sharp.
+    /// Standard deviation of the blur of colours, in pixels. Depth stays sharp.
     pub blur_px: f32,
 }
 
-/// Deviation of the camera in a robot's head from the robot's file. The robot knows only the file.
+/// Deviation of the camera in a robot's head from the robot's file. The robot itself relies on the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensFlaw {
     /// Pose of the actual lens in the nominal camera frame.
@@ -32,7 +31,7 @@ pub struct LensFlaw {
 ///
 ///   u = f x' + cx,   v = f y' + cy,
 ///
-/// with (x', y') of the [`Distortion`]: without any, (x / z, y / z).
+/// with (x', y') from the [`Distortion`]; without distortion they are (x / z, y / z).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
     pub width: u32,
@@ -58,7 +57,7 @@ impl Intrinsics {
         }
     }
 
-    /// Returns the intrinsics with the distortion of a model's lens.
+    /// Returns the intrinsics with the lens distortion of a camera model.
     pub fn of_model(self, model: CameraModel) -> Intrinsics {
         let half_height_tan = 0.5 * self.height as f32 / self.focal_px;
         Intrinsics { distortion: model.distortion(half_height_tan), ..self }
@@ -159,7 +158,7 @@ impl Cameras {
         Cameras { heads: heads.collect(), third_person, model: (CameraModel::Ideal, 0) }
     }
 
-    /// Puts the sensor of another model behind the lenses of the robots' heads; `seed` decides its noise.
+    /// Sets the model of the cameras in the robots' heads; `seed` determines its noise.
     pub fn set_model(&mut self, model: CameraModel, seed: u32) {
         self.model = (model, seed);
     }
@@ -179,7 +178,7 @@ impl Cameras {
         self.model.0.is_ideal()
     }
 
-    /// Gives the camera in the head of robot number `robot` another lens.
+    /// Replaces the lens of the camera in the head of robot number `robot`.
     pub fn set_lens(&mut self, robot: usize, lens: LensFlaw) {
         self.heads[robot].1 = lens;
     }

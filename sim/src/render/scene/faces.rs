@@ -3,8 +3,8 @@
 use crate::render::TriangleMesh;
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 
-/// The planes of a mesh's triangles, in its frame and in whole blocks: unit normals, and the offsets of
-/// the planes along them.
+/// Planes of a mesh's triangles, in the mesh's frame and in whole blocks: unit normals, and the planes'
+/// offsets along these normals.
 pub struct Faces {
     planes_m: Vec<[Lanes; 4]>,
     count: usize,
@@ -28,8 +28,8 @@ impl Faces {
         Faces { planes_m, count: mesh.triangles.len() }
     }
 
-    /// Writes the numbers of the triangles that may be visible, in their order, from a point
-    /// (x, y, z, 1) of the mesh's frame, or against a direction (x, y, z, 0).
+    /// Writes the indices of the triangles that may be visible, in their order. The viewer is at a point (x,
+    /// y, z, 1) of the mesh's frame, or infinitely far in a direction (x, y, z, 0).
     #[inline(always)]
     pub fn put_front(&self, front: &mut Vec<u32>, [x, y, z, w]: [f32; 4]) {
         front.resize(self.planes_m.len() * LANES, 0);

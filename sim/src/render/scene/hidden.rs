@@ -1,4 +1,4 @@
-//! Removal of triangles that are never visible: those inside of another part of the same body, such as
+//! Removal of triangles that are never visible because they are inside another part of the same body, such as
 //! most caps of capsules at a joint.
 
 use rapier3d::math::{Pose, Vector};
@@ -19,12 +19,12 @@ struct Placed {
     /// Centre and radius of a sphere around the mesh.
     centre_m: Vector,
     radius_m: f32,
-    /// Normals of its faces, outwards, and how far along them the faces lie, if it is convex.
+    /// Outward normals of its faces, and the faces' offsets along them; `None` unless the mesh is convex.
     hull_m: Option<Vec<(Vector, f32)>>,
 }
 
-/// Removes triangles inside another mesh of the body that is not clear. Each mesh has its pose in the frame
-/// of the body.
+/// Removes triangles inside another mesh of the body that is not see-through. Each mesh has its pose in the
+/// frame of the body.
 pub fn take_out(meshes: &mut [(TriangleMesh, Pose)], is_clear: &[bool]) {
     let placed: Vec<Placed> =
         meshes.iter().map(|(mesh, body_from_mesh)| Placed::of(mesh, body_from_mesh)).collect();
@@ -69,7 +69,7 @@ fn hull_m(mesh: &TriangleMesh, corners_m: &[Vector]) -> Vec<(Vector, f32)> {
     mesh.triangles.iter().map(face).collect()
 }
 
-/// Returns true if a point is at least this deep behind all of some faces.
+/// Returns true if a point is more than `depth_m` behind every face.
 fn is_deeper(faces_m: &[(Vector, f32)], point_m: Vector, depth_m: f32) -> bool {
     faces_m.iter().all(|(normal, along_m)| normal.dot(point_m) < along_m - depth_m)
 }

@@ -23,12 +23,13 @@ impl CameraModel {
         }
     }
 
-    /// Returns true for the default, which specs leave out.
+    /// Returns true for the default, which serialised specs omit.
     pub fn is_ideal(&self) -> bool {
         *self == CameraModel::Ideal
     }
 
-    /// Returns the distortion of the model's lens, if half its vertical angle has this tangent.
+    /// Returns the lens distortion of the model; `half_height_tan` is the tangent of half the vertical field
+    /// of view.
     pub fn distortion(self, half_height_tan: f32) -> Distortion {
         match self {
             CameraModel::Ideal => Distortion::NONE,
@@ -50,22 +51,23 @@ pub struct Distortion {
     pub p2: f32,
 }
 
-/// A published calibration of a D435i's colour images of 640x480: the file `realsense_color_config.yaml` of
-/// VINS-Mono and its relatives. It shifts the image's edge by 1.2 %; Intel's datasheet states at most 1.5 %.
+/// Published calibration of a D435i's colour images at 640x480, from the file `realsense_color_config.yaml`
+/// of VINS-Mono and related projects. The distortion shifts the image's edge by 1.2 %; Intel's datasheet
+/// states at most 1.5 %.
 const D435I: Distortion =
     Distortion { k1: 0.092_615_5, k2: -0.180_824_39, p1: -6.548_41e-4, p2: -3.582_935e-4 };
-/// Tangent of half the vertical angle of that calibration: 240 pixels by a focal length of 609.1.
+/// Tangent of half the vertical field of view of that calibration: 240 pixels over a focal length of 609.1.
 const D435I_HALF_HEIGHT: f32 = 240.0 / 609.095_8;
 
-/// Iterations that invert the distortion. Each divides the error by more than thirty.
+/// Number of iterations that invert the distortion. Each divides the error by more than thirty.
 const ITERATIONS: usize = 3;
 
 impl Distortion {
     /// Lens without distortion.
     pub const NONE: Distortion = Distortion { k1: 0.0, k2: 0.0, p1: 0.0, p2: 0.0 };
 
-    /// Returns the distortion of a D435i behind a lens of this vertical angle: a point is shifted by the same
-    /// part of the image's height as behind its own.
+    /// Returns a D435i's distortion for a lens with another vertical field of view. A point is shifted by the
+    /// same share of the image's height as with a D435i's own lens.
     fn d435i(half_height_tan: f32) -> Distortion {
         let scale = D435I_HALF_HEIGHT / half_height_tan;
         let squared = scale * scale;
@@ -73,7 +75,7 @@ impl Distortion {
         Distortion { k1: k1 * squared, k2: k2 * squared * squared, p1: p1 * scale, p2: p2 * scale }
     }
 
-    /// Returns the factor by which a point is moved outwards, and its other shift.
+    /// Returns the factor of the radial distortion, and the shift of the tangential distortion.
     #[inline(always)]
     fn shift(&self, [x, y]: [f32; 2]) -> (f32, [f32; 2]) {
         let (xx, xy, yy) = (x * x, x * y, y * y);
@@ -84,13 +86,13 @@ impl Distortion {
         (outwards, aside)
     }
 
-    /// Returns the place in the image of a ray.
+    /// Returns the distorted image coordinates of a ray.
     pub fn distorted(&self, ray: [f32; 2]) -> [f32; 2] {
         let (outwards, aside) = self.shift(ray);
         [ray[0] * outwards + aside[0], ray[1] * outwards + aside[1]]
     }
 
-    /// Returns the ray that is seen at a place of the image, `distorted_ray`.
+    /// Returns the ray that is seen at the distorted image coordinates `distorted_ray`.
     #[inline(always)]
     pub fn undistorted(&self, distorted_ray: [f32; 2]) -> [f32; 2] {
         let mut ray = distorted_ray;

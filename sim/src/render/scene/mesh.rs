@@ -12,7 +12,7 @@ use crate::mjcf::{Mesh, Primitive};
 pub struct Vertex {
     pub position_m: Vector,
     pub normal: Vector,
-    /// Texture coordinates: to the right and down from an image's top left corner; 0 without.
+    /// Texture coordinates: to the right and down from an image's top left corner; 0 if the mesh has none.
     pub uv: [f32; 2],
 }
 
@@ -29,14 +29,14 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Returns the number of latitude bands for a shape of this radius: even, and half of the number of
-/// corners around it. Edges are up to 1.1 mm inside of thin shapes, and a thirtieth of the radius inside
-/// of larger ones.
+/// Returns the number of latitude bands for a shape of this radius. It is even, and half the number of
+/// corners around the shape. Edges are up to 1.1 mm inside thin shapes, and a thirtieth of the radius inside
+/// larger ones.
 fn rings(radius_m: f32) -> u32 {
     if radius_m < 0.015 { 4 } else { 6 }
 }
 
-/// Drawn size of an unbounded plane.
+/// Half the drawn side of an unbounded plane.
 const PLANE_M: f32 = 20.0;
 
 impl TriangleMesh {
@@ -65,7 +65,7 @@ impl TriangleMesh {
         TriangleMesh::capsule(radius_m, 0.0)
     }
 
-    /// Returns a capsule along z; with no length, a sphere.
+    /// Returns a capsule along z, which is a sphere if its length is 0.
     pub fn capsule(radius_m: f32, half_length_m: f32) -> TriangleMesh {
         TriangleMesh::round(rings(radius_m), radius_m, half_length_m)
     }
@@ -147,7 +147,8 @@ impl TriangleMesh {
         mesh
     }
 
-    /// Returns the triangles of a file. They are smooth where the file gives no normals, except for edges.
+    /// Returns the triangles of a file's mesh. Where the file gives no normals, they are smooth except at
+    /// sharp edges.
     fn of_file(file: &Mesh) -> TriangleMesh {
         let mut mesh = TriangleMesh::faceted(&file.vertices_m, &file.triangles);
         let is_given = |normals: &[Vector; 3]| normals.iter().all(|normal| *normal != Vector::ZERO);
@@ -181,7 +182,7 @@ impl TriangleMesh {
         ((low + high) * 0.5, (high - low).length() * 0.5)
     }
 
-    /// Returns the corners of the mesh's bounding box, with the least coordinates and the greatest.
+    /// Returns the corners of the mesh's bounding box: the smallest coordinates, then the largest.
     pub fn corners_m(&self) -> [Vector; 2] {
         let points = self.vertices.iter().map(|vertex| vertex.position_m);
         [points.clone().fold(Vector::INFINITY, Vector::min), points.fold(Vector::NEG_INFINITY, Vector::max)]
@@ -193,7 +194,7 @@ impl TriangleMesh {
         (high - low).max_position()
     }
 
-    /// Returns a capsule of `rings` bands; with no length, a sphere.
+    /// Returns a capsule of `rings` bands, which is a sphere if its length is 0.
     fn round(rings: u32, radius_m: f32, half_length_m: f32) -> TriangleMesh {
         let (mut mesh, segments) = (TriangleMesh::default(), 2 * rings);
         for ring in 0..=rings {

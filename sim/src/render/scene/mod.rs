@@ -22,7 +22,7 @@ use crate::render::{Light, Pattern, SharedMesh};
 use crate::world::{CarriedLight, SceneLights};
 use crate::{Step, World};
 
-/// Shapes and colours of a world, made once.
+/// Shapes and colours of a world, built once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenery {
     pub parts: Vec<Part>,
@@ -33,7 +33,7 @@ pub struct Scenery {
     pub lamps: Option<Lamps>,
     /// The empty room, from which its baked light is computed; `None` with `lamps`.
     pub room: Option<Arc<Scenery>>,
-    /// Image around the camera where no surface is, or the six of a cube.
+    /// Background image around the camera: a single image, or the six of a cube.
     pub sky: Option<Arc<Texture>>,
 }
 
@@ -43,15 +43,15 @@ pub struct Part {
     pub mesh: SharedMesh,
     pub carrier: Carrier,
     pub carrier_from_mesh: Pose,
-    /// sRGB, 0 to 1. With an image it is the mean colour.
+    /// Colour in sRGB, 0 to 1. With an image it is the image's mean colour.
     pub rgb: [f32; 3],
-    /// Share of light from behind that the surface keeps out; below `SOLID_ALPHA` it is blended.
+    /// Share of light from behind that the surface blocks; below `SOLID_ALPHA` the part is blended.
     pub alpha: f32,
     pub gloss: Gloss,
     /// Image on the surface, in place of a pattern.
     pub image: Option<SurfaceImage>,
     pub pattern: Pattern,
-    /// Id in [`crate::render::Frame::ids`]; parts of one thing share one. 0 is the background.
+    /// Id in [`crate::render::Frame::ids`], shared by all parts of a body. 0 is the background.
     pub id: u32,
     pub casts_shadow: bool,
 }
@@ -71,7 +71,7 @@ pub struct Lamp {
     pub light: FileLight,
 }
 
-/// Carrier of a part, by its place in a [`Step`].
+/// Carrier of a part, by its index in a [`Step`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carrier {
     /// The fixed room; its frame is the world's.
@@ -108,21 +108,21 @@ pub struct PlacedScenery {
 
 /// Ids: 0 the background, 1 the room, then robots, then objects.
 const ROOM_ID: u32 = 1;
-/// Focus around the middle between the robots: it covers counter, objects and all hands.
+/// Focus of the shadows around the middle between the robots: it covers counter, objects and all hands.
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
-/// Focus for lights of files, whose scenes are seen as a whole.
+/// Focus radius for the lights of a file, whose scenes are seen as a whole.
 const LAMPS_FOCUS_RADIUS_M: f32 = 2.5;
-/// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
-/// into the room.
+/// Height of the lamps that the light represents. Walls and other parts of the room that reach higher cast no
+/// shadow into the room.
 const LAMPS_M: f32 = 2.2;
 /// The accent of each robot, in place of the material `accent` of the robot's file.
 const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];
 const ACCENT_MATERIAL: &str = "accent";
 
 impl Lamps {
-    /// Multiplies all light.
+    /// Multiplies the colours of all lights.
     pub fn tint(&mut self, tint_rgb: Vector) {
         let Headlight { ambient_rgb, diffuse_rgb, specular_rgb } = &mut self.headlight;
         for rgb in [ambient_rgb, diffuse_rgb, specular_rgb] {
@@ -138,12 +138,12 @@ impl Lamps {
 }
 
 impl Part {
-    /// Returns true if surfaces behind it show through.
+    /// Returns true if surfaces behind the part show through.
     pub fn is_veil(&self) -> bool {
         self.alpha < SOLID_ALPHA || self.is_cut_out()
     }
 
-    /// Returns true if the alpha of its image cuts it out.
+    /// Returns true if the alpha of the part's image cuts holes into it.
     pub fn is_cut_out(&self) -> bool {
         self.alpha >= SOLID_ALPHA && self.image.as_ref().is_some_and(|image| image.texture.has_alpha)
     }

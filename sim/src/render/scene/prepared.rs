@@ -13,16 +13,16 @@ use crate::render::shading::lanes::Affine;
 use crate::render::shading::linear;
 use crate::render::{Light, Part, Pattern, Scenery};
 
-/// Limits of the factor by which an image's texels are multiplied: nearly black images stay so.
+/// Limits on the factor that multiplies an image's texels. They keep nearly black images black.
 const MIN_MEAN: f32 = 1e-6;
 const MAX_TINT: f32 = 8.0;
 
-/// Mark of a sample without a surface.
+/// Patch index of a sample without a surface.
 pub const NOTHING: u32 = u32::MAX;
 
 pub struct Prepared {
     pub scenery: Scenery,
-    /// Light of the room, for rasterisers; `None` in the light of a sun or of a file's lights.
+    /// Baked light of the room, for rasterisers. `None` if a sun or the lights of a file light the scenery.
     pub baked: Option<Arc<BakedLight>>,
     pub sheets: Vec<Sheet>,
     /// The image of each part.
@@ -33,19 +33,19 @@ pub struct Prepared {
     pub is_veil: Vec<bool>,
     /// Image of the sky.
     pub sky: Option<Image>,
-    /// The number of each triangle's sheet, with triangles counted part by part.
+    /// Index of each triangle's patch, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
-    /// Number of the first triangle of each part.
+    /// Index of the first triangle of each part.
     first: Vec<usize>,
-    /// Id in images of each sheet.
+    /// Id of each patch in images.
     ids: Vec<u32>,
-    /// The two colours of each part. With an image, its texels are multiplied by the first.
+    /// Two colours of each part. The first multiplies the texels of an image.
     pub linear_rgb: Vec<[Vector; 2]>,
-    /// Axis of each part's mesh that comes first in its pattern: the one that a grain runs along.
+    /// Axis of each part's mesh along which the grain of its pattern runs.
     pub grain: Vec<usize>,
 }
 
-/// Neighbouring triangles of a part, for shading.
+/// Patch: adjacent triangles of a part that share one shading formula.
 #[derive(Clone, Copy)]
 pub struct Sheet {
     pub part: u32,
@@ -85,7 +85,7 @@ impl Prepared {
         }
     }
 
-    /// Returns the factor of baked light; `None` without such light.
+    /// Returns the factor on baked light. Returns `None` without baked light.
     pub fn tint(&self) -> Option<[f32; 3]> {
         let usual = Light::default().sun_rgb;
         self.baked.as_ref().map(|_| (self.scenery.light.sun_rgb / usual).to_array())
@@ -105,20 +105,20 @@ impl Prepared {
         }
     }
 
-    /// Numbers of the sheets of a part's triangles.
+    /// Returns the patch indices of a part's triangles.
     pub fn sheets_of(&self, part: usize) -> &[u32] {
         &self.sheet_of[self.first[part]..self.first[part + 1]]
     }
 
-    /// Returns the id of a sheet in images.
+    /// Returns the id of a patch in images.
     #[inline(always)]
     pub fn id(&self, sheet: u32) -> u32 {
-        // No sheet has the number that marks a sample without a surface.
+        // No patch has the index [`NOTHING`].
         self.ids.get(sheet as usize).copied().unwrap_or(0)
     }
 }
 
-/// Returns the grain axis; print is upright, whichever axis is longest.
+/// Returns the axis of the grain: the longest one, or x for print, which stays upright.
 fn grain(part: &Part) -> usize {
     if part.pattern == Pattern::Print { 0 } else { part.mesh.geometry().longest_axis }
 }

@@ -23,15 +23,15 @@ struct KeptMesh {
 
 /// Geometry of a mesh that does not depend on pose, colour or light.
 pub struct MeshGeometry {
-    /// Corners of the triangles, each position once. Meshes with flat faces repeat a corner for each
-    /// triangle there.
+    /// Corners of the triangles, without duplicate positions. Meshes with flat faces repeat a corner for each
+    /// of its triangles.
     pub points: Points,
     /// Triangles, as indices of their corners in `points`.
     pub triangles: Vec<[u32; 3]>,
     /// Planes of the triangles.
     pub faces: Faces,
     pub sheets: Vec<MeshSheet>,
-    /// Index of each triangle's sheet.
+    /// Index of each triangle's patch.
     pub sheet_of: Vec<u32>,
     /// Centre and radius of a sphere around the mesh.
     pub bounds: (Vector, f32),

@@ -1,5 +1,4 @@
-//! Sheets of a mesh: neighbouring triangles that are shaded alike, since one formula gives their normals and
-//! one their texture coordinates.
+//! Patches of a mesh: adjacent triangles that share one formula for normals and one for texture coordinates.
 
 use rapier3d::math::Vector;
 
@@ -7,7 +6,7 @@ use super::bend::Bend;
 use crate::render::shading::lanes::Affine;
 use crate::render::{TriangleMesh, Vertex};
 
-/// Triangles of a mesh, in its frame.
+/// Patch of a mesh, in the mesh's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshSheet {
     pub bend: Bend,
@@ -21,11 +20,11 @@ pub struct UvMap(pub [(Vector, f32); 2]);
 
 /// Tolerance on texture coordinates that a map gives.
 const UV_TOLERANCE: f32 = 1e-4;
-/// Number of the latest sheets that are tried for a triangle.
+/// Number of the latest patches that are tried for a triangle.
 const TRIED: usize = 8;
 
 impl TriangleMesh {
-    /// Returns the sheets of the mesh, and for each triangle the index of its sheet.
+    /// Returns the patches of the mesh, and for each triangle the index of its patch.
     pub(in crate::render) fn sheets(&self) -> (Vec<MeshSheet>, Vec<u32>) {
         let (bends, bend_of) = self.bends();
         if self.vertices.iter().all(|vertex| vertex.uv == [0.0; 2]) {
@@ -48,8 +47,8 @@ impl TriangleMesh {
 }
 
 impl UvMap {
-    /// Returns the map that interpolates the corners of a triangle, as [`Bend`] does for normals; that of its
-    /// first corner if it has no area.
+    /// Returns the map that interpolates the corners of a triangle, as [`Bend`] does for normals. For a
+    /// triangle without area the map is constant, with the coordinates of the first corner.
     fn between([a, b, c]: &[Vertex; 3]) -> UvMap {
         let (ab, ac) = (b.position_m - a.position_m, c.position_m - a.position_m);
         let face = ab.cross(ac);
@@ -81,7 +80,7 @@ impl UvMap {
 mod tests {
     use super::*;
 
-    /// Returns a square in z = 0 of two triangles, whose corners have these texture coordinates.
+    /// Returns a square of two triangles at z = 0, whose corners have these texture coordinates.
     fn square(uvs: [[f32; 2]; 6]) -> TriangleMesh {
         let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
         let vertices = corners.iter().zip(uvs).map(|([x, y], uv)| Vertex {

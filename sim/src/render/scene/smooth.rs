@@ -9,8 +9,9 @@ const SMOOTH_COSINE: f32 = 0.8;
 /// Number of faces at a vertex beyond which its edges stay sharp: each face is compared with all others.
 const MAX_FACES: usize = 64;
 
-/// Returns normals at the corners of each triangle: means of the faces at the vertex, by their areas,
-/// without those that the own face meets in a sharp edge. Zero for triangles without area.
+/// Returns the normals at the corners of each triangle. A normal is the area-weighted mean of the faces at
+/// the vertex, without faces that meet the triangle's own in a sharp edge. It is zero for triangles without
+/// area.
 pub fn smooth_normals(file: &Mesh) -> Vec<[Vector; 3]> {
     let across = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|corner| file.vertices_m[corner as usize]);

@@ -1,4 +1,4 @@
-//! Visible meshes of the geoms of a body, cached for all worlds of a process that contain such a body.
+//! Visible meshes of the geoms of a body, cached for all worlds of a process that contain an equal body.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};

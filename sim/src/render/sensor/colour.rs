@@ -1,5 +1,5 @@
-//! Colours by a D435i's sensor, an OmniVision OV2740: exposure and gain, rolling shutter, blur of a moving
-//! camera, and noise.
+//! Colour images of a D435i's sensor, an OmniVision OV2740: exposure and gain, rolling shutter, motion blur
+//! and noise.
 
 use std::sync::LazyLock;
 
@@ -10,34 +10,35 @@ use super::warp::{LinearImage, Warp};
 use crate::render::shading::srgb::SrgbTable;
 use crate::srgb::linear_light;
 
-/// Rows of the sensor that become the image's.
+/// Number of sensor rows that the image covers.
 const SENSOR_ROWS: f32 = 1080.0;
-/// Time from one row of the sensor to the next: 1080 cycles of 72 MHz. Source: Linux's driver `ov2740`.
+/// Readout time of a sensor row: 1080 cycles of 72 MHz. Source: Linux's driver `ov2740`.
 const ROW_S: f32 = 15e-6;
-/// Time from the first row to the last.
+/// Time from the readout of the first row to that of the last.
 pub const READOUT_S: f32 = SENSOR_ROWS * ROW_S;
 
-/// Exposure of a row: 100 us is the least that librealsense sets, and 33 ms fill a frame of 30 Hz.
+/// Range of a row's exposure time: librealsense's minimum is 100 us, and 33 ms fill a frame period at 30 Hz.
 const EXPOSURE_S: [f32; 2] = [1e-4, 0.033];
-/// Analogue gain of Linux's driver `ov2740`, 128 to 1983 in units of 1/128.
+/// Range of the analogue gain in Linux's driver `ov2740`: 128 to 1983 in units of 1/128.
 const GAIN: [f32; 2] = [1.0, 1983.0 / 128.0];
-/// Mean luminance for which the camera exposes: a grey card's.
+/// Target mean luminance of automatic exposure, which is that of a grey card.
 const MEAN_LUMINANCE: f32 = 0.18;
 
-/// Electrons of a saturated pixel and of its readout. OmniVision publishes neither for the OV2740; these are
-/// those of its OV5647, whose pixel has the same 1.4 um: full well 4300, and a dynamic range of 68 dB.
+/// Full-well capacity and read noise of a pixel, in electrons. OmniVision publishes neither for the OV2740.
+/// These are the values of its OV5647, whose pixels have the same pitch of 1.4 um: a full well of 4300, and a
+/// dynamic range of 68 dB.
 const FULL_WELL: f32 = 4300.0;
 const READ_NOISE: f32 = 1.7;
-/// Electrons that a pixel collects in a second from white at the brightness of linear light 1. Assumed: 500 lx
-/// (EN 12464-1, offices), a lens of f/2.0, which lets 28 lx through to the sensor, 8000 photons a second and
-/// lux on 1.4 um squared, and 0.3 electrons a photon behind the colour filter.
+/// Electrons per second in a pixel that sees a white surface in linear light 1. Assumed: an illuminance of
+/// 500 lx (EN 12464-1, offices), and a lens of f/2.0 that passes 28 lx to the sensor; 8000 photons per second
+/// and lux on 1.4 um squared, and 0.3 electrons per photon behind the colour filter.
 const WHITE_1_S: f32 = 7e4;
-/// Share of the sensor's pixels behind a filter of red, green and blue.
+/// Shares of the sensor's pixels with a red, green and blue filter.
 const FILTERED: [f32; 3] = [0.25, 0.5, 0.25];
 
-/// Luminance of linear sRGB, after Rec. 709.
+/// Luminance weights of linear sRGB, after Rec. 709.
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
-/// One pixel of this many is metered.
+/// Stride of the metered pixels.
 const METERED: usize = 5;
 
 static DECODED: LazyLock<[f32; 256]> =
@@ -50,7 +51,7 @@ pub struct SensorLight {
     mean_value: f32,
 }
 
-/// Setting of the sensor.
+/// Exposure time and gain of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
     pub time_s: f32,
@@ -58,22 +59,22 @@ pub struct Exposure {
 }
 
 impl Exposure {
-    /// Returns the setting that multiplies the light by `wanted_factor`, within its limits. A long exposure
-    /// is preferred to gain.
+    /// Returns the setting that multiplies the light by `wanted_factor`, within the sensor's limits. A longer
+    /// exposure is preferred to a higher gain.
     fn of(wanted_factor: f32) -> Exposure {
         let light_1_s = WHITE_1_S / FULL_WELL;
         let time_s = (wanted_factor / light_1_s).clamp(EXPOSURE_S[0], EXPOSURE_S[1]);
         Exposure { time_s, gain: (wanted_factor / (light_1_s * time_s)).clamp(GAIN[0], GAIN[1]) }
     }
 
-    /// Returns the factor from light to values of the image, of which 1 is saturated.
+    /// Returns the factor from light to image values, where 1 is saturation.
     pub fn factor(&self) -> f32 {
         WHITE_1_S / FULL_WELL * self.time_s * self.gain
     }
 
-    /// Returns the variance of a value of the image, of each colour, as a slope and an offset: shot noise,
-    /// which is the number of electrons, and that of reading. An image of fewer rows than the sensor is the
-    /// mean of its pixels.
+    /// Returns the variance of image values per colour channel, as a slope and an offset. The slope is shot
+    /// noise, proportional to the number of electrons; the offset is read noise. If the image has fewer rows
+    /// than the sensor, each of its pixels is the mean of several sensor pixels.
     pub fn variance(&self, height: u32) -> [[f32; 2]; 3] {
         let pixels = (SENSOR_ROWS / height as f32).powi(2);
         let value = self.gain / FULL_WELL;
@@ -107,7 +108,7 @@ impl SensorLight {
         let [mut values, mut drawn]: [[Vec<f32>; 3]; 2] =
             std::array::from_fn(|_| std::array::from_fn(|_| vec![0.0; width]));
         for (row, bytes) in rgb.chunks_exact_mut(3 * width).enumerate() {
-            // The image is of the moment in which its middle row is exposed.
+            // The image's time is the exposure of its middle row.
             let late_s = ((row as f32 + 0.5) / height as f32 - 0.5) * READOUT_S;
             warp.place_row(row, depth_m, &shot.motion);
             for column in 0..width {

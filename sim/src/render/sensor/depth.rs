@@ -1,25 +1,25 @@
-//! Depth by a D435i's stereo cameras: disparity with noise and steps, and holes.
+//! Depth images of a D435i's stereo cameras: noisy, quantised disparity, and holes.
 //!
-//! The two imagers have global shutters, and the depth is that of the colour image's pixels. The left one is
-//! the reference: a pixel has no depth if the right one does not see the same point.
+//! The two imagers have global shutters. Depth is aligned to the pixels of the colour image. The left imager
+//! is the reference: a pixel has no depth if the right imager does not see the same point.
 
 use super::lens::LensMap;
 use super::noise::PixelNoise;
 
 /// Distance between the imagers.
 pub const BASELINE_M: f32 = 0.05;
-/// Focal length of the imagers at their full resolution, 1280x720, of a factory calibration.
+/// Focal length of the imagers at their full resolution, 1280x720, from a factory calibration.
 const FOCAL_PX: f32 = 645.0;
 /// Disparity times depth.
 pub const DISPARITY_PX_M: f32 = FOCAL_PX * BASELINE_M;
-/// Steps of the disparity in a pixel.
+/// Disparity steps per pixel.
 pub const STEPS: f32 = 32.0;
-/// Standard deviation of the disparity. It is assumed such that the error of depth is within the datasheet's
-/// 2 % at 2 m.
+/// Standard deviation of the disparity. The assumed value keeps the depth error within the datasheet's 2 % at
+/// 2 m.
 pub const NOISE_PX: f32 = 0.08;
-/// Depth within which there is any: the datasheet's minimum at full resolution, and its maximum.
+/// Range of measurable depth: the datasheet's minimum at full resolution, and its maximum.
 pub const RANGE_M: [f32; 2] = [0.28, 10.0];
-/// Depth is reported in millimetres.
+/// Depth units per metre: depth is reported in millimetres.
 const UNITS_1_M: f32 = 1000.0;
 
 /// Returns the depth that the camera measures; infinite where it measures none.
@@ -55,7 +55,7 @@ fn hide(depth_m: &mut [f32], focal_px: f32) {
 fn measured_m(ideal_m: f32, drawn_deviation: f32) -> f32 {
     let disparity_px = nearest_whole((DISPARITY_PX_M / ideal_m + NOISE_PX * drawn_deviation) * STEPS) / STEPS;
     let depth_m = nearest_whole(DISPARITY_PX_M / disparity_px * UNITS_1_M) / UNITS_1_M;
-    // A disparity of zero has an infinite depth, a negative one 0.
+    // A disparity of zero, to which negative ones are rounded, gives a depth far beyond the range.
     if (RANGE_M[0]..=RANGE_M[1]).contains(&depth_m) && ideal_m.is_finite() { depth_m } else { f32::INFINITY }
 }
 

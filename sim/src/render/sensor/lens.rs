@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::render::Intrinsics;
 
-/// Number of maps that are kept, the last used first: one for each size of images.
+/// Number of cached maps, most recently used first. Each image size needs one map.
 const KEPT: usize = 4;
 
 static MAPS: Mutex<Vec<Arc<LensMap>>> = Mutex::new(Vec::new());
@@ -19,7 +19,7 @@ pub struct LensMap {
 }
 
 impl LensMap {
-    /// Returns the map of a lens, which is shared.
+    /// Returns the map of a lens from a shared cache.
     pub fn of(lens: &Intrinsics) -> Arc<LensMap> {
         let mut kept = MAPS.lock().unwrap_or_else(PoisonError::into_inner);
         let place = kept.iter().position(|map| map.lens == *lens);
@@ -35,7 +35,7 @@ impl LensMap {
         for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
             let [x, y] =
                 distortion.undistorted([(column as f32 - cx) / focal_px, (row as f32 - cy) / focal_px]);
-            // Before the first pixel, a cast gives that one.
+            // A cast clamps negative indices to the first pixel.
             let [left, above] = [focal_px * x + cx, focal_px * y + cy].map(|px| (px + 0.5) as u32);
             map.pixel_ray[0].push(x);
             map.pixel_ray[1].push(y);
@@ -44,7 +44,8 @@ impl LensMap {
         map
     }
 
-    /// Returns the values of an ideal image that the pixels of a camera at rest see, without blending them.
+    /// Samples an ideal image at the nearest pixel of each sensor pixel, for a camera at rest. Values are not
+    /// blended.
     pub fn nearest_of<T: Copy>(&self, ideal: &[T]) -> Vec<T> {
         self.nearest.iter().map(|pixel| ideal[*pixel as usize]).collect()
     }

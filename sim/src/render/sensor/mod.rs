@@ -1,6 +1,6 @@
-//! Sensors behind the lens of a head camera. A renderer draws the ideal image; the sensor turns it into the
-//! one that a camera would deliver. This is the same for all renderers, and a function of the ideal image,
-//! a seed and the camera's motion, so that the same step always has the same image.
+//! Sensors behind the lens of a head camera. A renderer draws the ideal image; the sensor converts it to the
+//! image that a camera would deliver. The conversion is the same for all renderers. It depends only on the
+//! ideal image, a seed and the camera's motion, so equal steps give equal images.
 //!
 //! The book's page about physics lists the modelled effects, with values and sources.
 
@@ -58,7 +58,7 @@ impl CameraView {
     }
 
     /// Renders only the colours of the image after `step`, like [`CameraView::render`]. A sensor needs the
-    /// depth, too: near surfaces move more in a moving camera's image.
+    /// depth, too: in the image of a moving camera, near surfaces move faster.
     pub fn render_colours(&self, renderer: &mut dyn Renderer, step: &Step) -> Vec<u8> {
         match self.shot {
             None => renderer.render_colours(step, &self.camera),
@@ -80,7 +80,7 @@ impl CameraView {
         })
     }
 
-    /// Returns the sensor's image of an ideal one.
+    /// Converts an ideal image to the sensor's image.
     fn take(&self, ideal: Frame) -> Frame {
         match &self.shot {
             None => ideal,
@@ -115,12 +115,12 @@ impl Cameras {
 }
 
 impl Shot {
-    /// Returns the seed of the image of a robot after a control step.
+    /// Returns the noise seed of a robot's image after a control step.
     pub fn seed(episode: u32, robot: usize, control_step: u64) -> u64 {
         noise::mixed(u64::from(episode) << 32 | robot as u64) ^ noise::mixed(control_step + 1)
     }
 
-    /// Returns a D435i's image of the view of an ideal camera with these intrinsics.
+    /// Converts an ideal image with these intrinsics to a D435i's image.
     fn d435i(&self, ideal: Frame, lens: &Intrinsics) -> Frame {
         let light = colour::SensorLight::of(&ideal.rgb, ideal.width, ideal.height);
         let map = LensMap::of(lens);

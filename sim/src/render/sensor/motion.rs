@@ -1,4 +1,4 @@
-//! Motion of a camera, and of the image that it sees.
+//! Motion of a camera, and the resulting motion of its image.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -12,7 +12,7 @@ pub struct CameraMotion {
 }
 
 impl CameraMotion {
-    /// Motion of a camera that stands still.
+    /// Motion of a camera at rest.
     pub const STILL: CameraMotion = CameraMotion { linear_m_s: Vector::ZERO, angular_rad_s: Vector::ZERO };
 
     /// Returns the mean motion in the control step between two poses.
@@ -26,9 +26,9 @@ impl CameraMotion {
         }
     }
 
-    /// Returns the velocity at which the image of an earlier or later camera moves over this one, relative to
-    /// the focal length, where the ray through `(x, y, 1)` is seen, x right and y down. For a world that stands
-    /// still, by Longuet-Higgins and Prazdny 1980:
+    /// Returns the velocity, relative to the focal length, at which the pixel of the ray `(x, y, 1)` moves
+    /// over the image of a static world. Here x is right and y down. The velocity is minus the optical flow
+    /// of Longuet-Higgins and Prazdny 1980:
     ///
     ///   dx/dt = (vx - x vz) / z + wy (1 + x^2) - wz y - wx x y,
     ///   dy/dt = (vy - y vz) / z - wx (1 + y^2) + wz x + wy x y.

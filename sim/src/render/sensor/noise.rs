@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 const BITS: u32 = 12;
 const COUNT: usize = 1 << BITS;
 
-/// Quantiles of the normal distribution, each of the same probability.
+/// Equiprobable quantiles of the standard normal distribution.
 static QUANTILES: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..COUNT).map(|i| quantile((i as f64 + 0.5) / COUNT as f64) as f32).collect());
 
@@ -16,7 +16,7 @@ pub struct PixelNoise {
 }
 
 impl PixelNoise {
-    /// Returns the noise of a seed; `stream` separates its uses.
+    /// Creates the noise of a seed; different streams are independent.
     pub fn new(seed: u64, stream: u64) -> PixelNoise {
         PixelNoise { seed: mixed(seed ^ mixed(stream)), quantile_values: &QUANTILES }
     }
@@ -42,8 +42,8 @@ pub fn mixed(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Returns the number that a share of normally distributed ones stay below: Abramowitz and Stegun 26.2.23,
-/// whose error is below 4.5e-4.
+/// Returns the quantile of the standard normal distribution at `share`, with an error below 4.5e-4. Source:
+/// Abramowitz and Stegun 26.2.23.
 fn quantile(share: f64) -> f64 {
     let (tail, sign) = if share < 0.5 { (share, -1.0) } else { (1.0 - share, 1.0) };
     let t = (-2.0 * tail.ln()).sqrt();

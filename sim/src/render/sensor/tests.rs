@@ -1,4 +1,4 @@
-//! Tests of a D435i's images, on images with known ideal ones.
+//! Tests of a D435i's images against known ideal images.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -57,7 +57,7 @@ fn depth_errs_by_the_square_of_the_distance_in_steps_of_a_32nd_of_a_pixel() {
     for ideal_m in [0.91, 2.03, 4.31] {
         let measured_m = depth::taken(&vec![ideal_m; WIDTH * HEIGHT], &LensMap::of(&lens()), 7);
         let disparities_px = measured_m.iter().map(|depth_m| DISPARITY_PX_M / depth_m);
-        // Millimetres are the larger steps up close.
+        // Up close, rounding to millimetres is coarser than the disparity steps.
         let rounding_steps = STEPS * DISPARITY_PX_M / (ideal_m * ideal_m) * 0.0005 * 1.1;
         for disparity_px in disparities_px {
             let steps = disparity_px * STEPS;
@@ -85,7 +85,7 @@ fn depth_has_limits() {
     assert_eq!(RANGE_M, [0.28, 10.0]);
 }
 
-/// A box stands before a wall: the right imager does not see the wall behind its left edge.
+/// A box is in front of a wall. The right imager does not see the wall behind the box's left edge.
 #[test]
 fn a_near_thing_has_a_hole_of_the_baseline_on_its_left() {
     let (near_m, far_m) = (0.6, 2.4);
@@ -104,7 +104,7 @@ fn a_near_thing_has_a_hole_of_the_baseline_on_its_left() {
         assert_eq!(holes.len(), 150 - holes[0], "one hole in row {row}: {holes:?}");
         assert!((holes.len() as f32 - width_px).abs() <= 1.0, "{} columns, not {width_px}", holes.len());
     }
-    // A floor that extends away from the camera has none.
+    // A floor that extends away from the camera has no holes.
     let floor_m = each_pixel(|u, v| if v < 130 { 9.0 } else { 90.0 / (v as f32 - 120.0 + 0.05 * u as f32) });
     assert!(depth::taken(&floor_m, &LensMap::of(&lens()), 7).iter().all(|depth_m| depth_m.is_finite()));
 }
@@ -148,8 +148,8 @@ fn bright_scenes_are_exposed_for_less_long_and_dark_ones_with_gain() {
     assert!(dark.time_s == 0.033 && bright.time_s < 0.02, "{dark:?} {bright:?}");
 }
 
-/// Returns the place at which each row of the image crosses the middle between dark and bright, and the number
-/// of pixels in between, for a vertical edge at column 160.
+/// Returns for each row the column of a vertical edge, and the number of blurred pixels between dark and
+/// bright. The edge is at column 160 in the ideal image.
 fn edge(depth_m: f32, motion: CameraMotion) -> Vec<[f32; 2]> {
     let ideal = each_pixel(|u, _| if u < 160 { [40; 3] } else { [200; 3] }).concat();
     let light = SensorLight::of(&ideal, WIDTH as u32, HEIGHT as u32);
@@ -158,7 +158,7 @@ fn edge(depth_m: f32, motion: CameraMotion) -> Vec<[f32; 2]> {
     let taken = light.taken(&exposure, &vec![depth_m; WIDTH * HEIGHT], &LensMap::of(&lens()), &shot);
     let values = [40.0, 200.0].map(|byte: f32| linear_light(byte / 255.0) * exposure.factor());
     let rows = taken.chunks_exact(3 * WIDTH).map(|row| {
-        // The sum of the row's brightness tells where the edge is, with the least noise.
+        // The sum of the row's brightness gives the edge's position with the least noise.
         let bright = |column: usize| {
             let value = linear_light(f32::from(row[3 * column + 1]) / 255.0);
             (value - values[0]) / (values[1] - values[0])
@@ -176,7 +176,7 @@ fn a_turning_camera_shears_and_blurs_its_image() {
     let turn_rad_s = 1.5;
     let motion = CameraMotion { linear_m_s: Vector::ZERO, angular_rad_s: Vector::Y * turn_rad_s };
     let rows = edge(f32::INFINITY, motion);
-    // The camera moves to the left, so things move to the right, by more the later a row is read.
+    // The camera turns to the left, so the image moves to the right, and farther the later a row is read.
     let shear_px = FOCAL_PX * turn_rad_s * READOUT_S;
     let part = |rows: &[[f32; 2]], i: usize| rows.iter().map(|row| row[i]).sum::<f32>() / rows.len() as f32;
     let (top, bottom) = (part(&rows[..20], 0), part(&rows[220..], 0));
@@ -185,7 +185,7 @@ fn a_turning_camera_shears_and_blurs_its_image() {
     assert!((part(&rows[110..130], 0) - 160.0).abs() < 0.2, "the middle row is of this moment");
     let still = edge(f32::INFINITY, CameraMotion::STILL);
     assert!(part(&still, 1) < 0.5 && (part(&still, 0) - 160.0).abs() < 0.2);
-    // With an exposure of 33 ms, the way from 15 to 85 % is seven tenths of the motion.
+    // With an exposure of 33 ms, the transition from 15 % to 85 % covers seven tenths of the motion.
     let blur_px = 0.7 * FOCAL_PX * turn_rad_s * 0.033;
     assert!((part(&rows, 1) - blur_px).abs() < 1.0, "{} pixels, not {blur_px}", part(&rows, 1));
 }

@@ -4,21 +4,20 @@ use super::lens::LensMap;
 use super::motion::CameraMotion;
 use crate::render::Intrinsics;
 
-/// Maximum stretch of the ideal image, in pixels, for one sample of a blurred pixel. Blending between pixels
-/// has this reach.
+/// Maximum motion blur per sample, in pixels of the ideal image. Bilinear interpolation covers this distance.
 const SAMPLE_PX: f32 = 1.0;
 /// Maximum number of samples of a blurred pixel.
 const MAX_SAMPLES: i32 = 16;
 
-/// Linear colours of an ideal image, with a fourth number to fill lanes. The last column and row are there
-/// twice, so that every pixel has a neighbour.
+/// Linear colours of an ideal image, with a fourth number to fill lanes. The last column and row are
+/// duplicated, so that every pixel has a neighbour.
 pub struct LinearImage {
     width: usize,
     height: usize,
     padded_rgb: Vec<[f32; 4]>,
 }
 
-/// Places in the ideal image of one row of pixels, and their velocities.
+/// Positions of one row of pixels in the ideal image, and their velocities.
 pub struct Warp<'a> {
     map: &'a LensMap,
     places_px: [Vec<f32>; 2],
@@ -45,7 +44,7 @@ impl LinearImage {
         LinearImage { width, height, padded_rgb }
     }
 
-    /// Returns the mean of one pixel of `every`.
+    /// Returns the mean over every `every`-th pixel.
     pub fn mean(&self, every: usize) -> [f32; 3] {
         let mut sum = [0.0; 4];
         let metered = || self.padded_rgb.iter().step_by(every);
@@ -55,7 +54,7 @@ impl LinearImage {
         std::array::from_fn(|axis| sum[axis] / metered().count() as f32)
     }
 
-    /// Reads between pixels. The border's pixels are repeated beyond it.
+    /// Interpolates between pixels. The border's pixels are repeated beyond it.
     #[inline(always)]
     fn read(&self, [x, y]: [f32; 2]) -> [f32; 4] {
         let (x, y) = (x.max(0.0).min((self.width - 1) as f32), y.max(0.0).min((self.height - 1) as f32));
@@ -77,7 +76,7 @@ impl<'a> Warp<'a> {
         Warp { map, places_px: [zeros(), zeros()], flow_px_s: [zeros(), zeros()] }
     }
 
-    /// Finds the places of a row, and their velocities in the image of a camera that moves.
+    /// Computes the positions of a row's pixels, and their velocities in the image of a moving camera.
     pub fn place_row(&mut self, row: usize, depth_m: &[f32], motion: &CameraMotion) {
         let Intrinsics { width, focal_px, cx, cy, .. } = self.map.lens;
         let pixels = row * width as usize..(row + 1) * width as usize;
@@ -97,8 +96,8 @@ impl<'a> Warp<'a> {
         }
     }
 
-    /// Returns the light that falls on a pixel which is exposed for `time_s`, in the middle `late_s` after
-    /// the moment of the ideal image.
+    /// Returns the light on a pixel whose exposure takes `time_s`. The middle of the exposure is `late_s`
+    /// after the time of the ideal image.
     #[inline(always)]
     pub fn light(&self, ideal: &LinearImage, column: usize, late_s: f32, time_s: f32) -> [f32; 4] {
         let [x, y] = [self.places_px[0][column], self.places_px[1][column]];

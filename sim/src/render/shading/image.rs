@@ -9,45 +9,46 @@ use super::linear;
 use super::power::linear_value;
 use crate::mjcf::{Gloss, SurfaceImage, Texture, TextureLevel, TextureMapping};
 
-/// Image of a part, with the map to it.
+/// Image of a part, with the map to image coordinates.
 #[derive(Clone)]
 pub struct Image {
     pub texture: Arc<Texture>,
-    /// Numbers at the same places, as in [`SurfaceImage`].
+    /// Further layers with the same coordinates; see [`SurfaceImage`].
     pub gloss: Option<Arc<Texture>>,
     pub relief: Option<Arc<Texture>>,
     pub emitted: Option<Arc<Texture>>,
     /// Map from the part's mesh to coordinates that [`Image::place`] takes; `None` if the mesh gives
     /// texture coordinates.
     pub from_mesh: Option<Affine>,
-    /// True if the coordinates are a direction from the middle of a cube.
+    /// True if the coordinates are a direction from the centre of a cube.
     pub is_cube: bool,
-    /// True if each face of the cube has an image of its own.
+    /// True if each face of the cube has its own image.
     has_faces: bool,
-    /// Number of the smallest level.
+    /// Index of the smallest mip level.
     last_level: f32,
 }
 
-/// Place on an image: coordinates to the right and down, and their differences over a step in x and in y.
+/// Position on an image: coordinates to the right and down. Their differences over a step in x and a step in
+/// y span the footprint of the lookup.
 #[derive(Clone, Copy)]
 pub struct ImagePlace {
     pub uv: [f32; 2],
     pub x_step_uv: [f32; 2],
     pub y_step_uv: [f32; 2],
-    /// Index of the image; 0 if there is only one.
+    /// Index of the cube face's image; 0 if there is only one image.
     pub face: usize,
 }
 
-/// Steps of the table from sRGB to linear light between one byte and the next.
+/// Number of table steps per sRGB byte.
 const LIGHT_STEPS: usize = 4;
 const LIGHT_VALUES: usize = 256 * LIGHT_STEPS;
-/// Linear light of sRGB values between bytes.
+/// Linear light of sRGB values, in steps finer than a byte.
 static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
     LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
 
-/// Minimum part of a relief's normal along the surface's own normal.
+/// Minimum component of a relief's normal along the surface normal.
 pub const MIN_UPRIGHT_SHARE: f32 = 0.05;
-/// Part of the way from one level to the next in which both are blended.
+/// Share of the interval between two mip levels in which both are blended.
 pub const BLENDED_SHARE: f32 = 0.5;
 
 impl Image {
@@ -99,15 +100,16 @@ impl Image {
         }
     }
 
-    /// Returns the linear colour of the sky along a ray of the world, as a mean over about a step in x and y.
+    /// Returns the linear colour of the sky along a ray (world frame), averaged over the footprint of the
+    /// steps in x and y.
     #[inline(always)]
     pub fn sky_rgb(&self, ray: Vector, [x_step, y_step]: [Vector; 2]) -> Vector {
-        // The cube's y is up. Source: MuJoCo's `render_gl3.c`.
+        // The cube's y axis points up. Source: MuJoCo's `render_gl3.c`.
         let on_cube = |ray: Vector| [ray.x, ray.z, -ray.y];
         self.rgb(&self.place(on_cube(ray), on_cube(x_step), on_cube(y_step))).into()
     }
 
-    /// Returns the place on the image of three coordinates with their differences over a step in x and in y.
+    /// Returns the image position of three coordinates, given their differences over the steps in x and y.
     #[inline(always)]
     pub fn place(&self, values: [f32; 3], x_step_values: [f32; 3], y_step_values: [f32; 3]) -> ImagePlace {
         if self.is_cube {
@@ -119,21 +121,21 @@ impl Image {
         ImagePlace { uv: flat(values), x_step_uv, y_step_uv, face: 0 }
     }
 
-    /// Returns the linear colour at a place, as a mean over about a step in x and in y.
+    /// Returns the linear colour at a place, averaged over its footprint.
     #[inline(always)]
     pub fn rgb(&self, place: &ImagePlace) -> [f32; 3] {
         self.rgb_and_alpha(place).0
     }
 
-    /// Returns the linear colour at a place and its alpha, which is 1 for images without.
+    /// Returns the linear colour and the alpha at a place. Alpha is 1 for images without an alpha channel.
     #[inline(always)]
     pub fn rgb_and_alpha(&self, place: &ImagePlace) -> ([f32; 3], f32) {
         let texel = texel(&self.texture.levels, self.last_level, place, self.is_cube);
         (light_of(&texel), if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
     }
 
-    /// Returns the linear colour of the light that the surface emits at a place; `None` if it has no layer of
-    /// emission.
+    /// Returns the linear colour of the light that the surface emits at a place. Returns `None` without a
+    /// layer of emission.
     #[inline(always)]
     pub fn emitted_rgb(&self, place: &ImagePlace, gloss: &Gloss) -> Option<[f32; 3]> {
         let texture = self.emitted.as_ref()?;
@@ -143,12 +145,12 @@ impl Image {
         Some(light_of(&texel(&texture.levels, last_level, &place, self.is_cube)).map(|value| value * factor))
     }
 
-    /// Returns true if it has numbers for ambient light, or emits light.
+    /// Returns true if a layer changes ambient light or emits light.
     pub fn changes_light(&self) -> bool {
         self.gloss.is_some() || self.emitted.is_some()
     }
 
-    /// Returns numbers of a texture at a place, each 0 to 1.
+    /// Returns the channels of a texture at a place, each from 0 to 1.
     #[inline(always)]
     pub fn numbers(&self, texture: &Texture, place: &ImagePlace) -> [f32; 3] {
         let last_level = (texture.levels.len() - 1) as f32;
@@ -158,9 +160,9 @@ impl Image {
     }
 }
 
-/// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The
-/// gradients of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are
-/// given.
+/// Returns the unit normal of a relief on a surface with the normal `normal`. Returns `normal` if the
+/// relief's normal faces away from the eye. The gradients of the image coordinates may have any length.
+/// Source: Blinn 1978, with a map of normals in place of heights.
 #[inline(always)]
 pub fn bent_normal(
     normal: Vector,
@@ -175,7 +177,7 @@ pub fn bent_normal(
     if bent.dot(eye_direction) > 0.0 { bent } else { normal }
 }
 
-/// Returns linear light of values from 0 to 255.
+/// Converts sRGB values from 0 to 255 to linear light.
 #[inline(always)]
 fn light_of(texel: &Lanes<4>) -> [f32; 3] {
     let light = &*LIGHT;
@@ -185,7 +187,7 @@ fn light_of(texel: &Lanes<4>) -> [f32; 3] {
     )
 }
 
-/// Returns the values, 0 to 255, at a place, as a mean over about a step in x and in y.
+/// Returns the channels (0 to 255) at a place, averaged over its footprint.
 #[inline(always)]
 fn texel(levels: &[TextureLevel], last_level: f32, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
     let [width, height] = levels[0].size_px;
@@ -203,14 +205,14 @@ fn texel(levels: &[TextureLevel], last_level: f32, place: &ImagePlace, is_cube: 
     texel
 }
 
-/// Returns the values, 0 to 255, at a place on one level, blended between four texels.
+/// Returns the channels (0 to 255) at a place, interpolated between four texels of one level.
 #[inline(always)]
 fn blend(level: &TextureLevel, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
     let [u, v] = place.uv;
     let [width, height] = level.size_px;
     let (mut x, mut y) = (u * width - 0.5, v * height - 0.5);
     if is_cube {
-        // Faces of a cube do not continue on their own other side.
+        // A face of a cube does not wrap around.
         (x, y) = (x.max(0.0).min(width - 1.0), y.max(0.0).min(height - 1.0));
     }
     let (left, top) = (x.floor(), y.floor());
@@ -225,7 +227,7 @@ fn blend(level: &TextureLevel, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
     lanes(|i| upper[i] + (lower[i] - upper[i]) * down)
 }
 
-/// Returns a whole number, modulo 2^22; so negative ones are right modulo smaller powers of two.
+/// Converts a whole number modulo 2^22. Negative numbers are therefore correct modulo smaller powers of two.
 #[inline(always)]
 fn index(whole_value: f32) -> usize {
     const ALL_BITS_WHOLE: f32 = (3 << 22) as f32;
@@ -239,7 +241,7 @@ fn between(first: [u8; 4], second: [u8; 4], share: f32) -> Lanes<4> {
     lanes(|i| first[i] + (second[i] - first[i]) * share)
 }
 
-/// Returns the place on the face of a cube that a direction meets.
+/// Returns the position at which a direction meets a face of the cube.
 /// Faces are in the order +x, -x, +y, -y, +z, -z.
 /// Source: OpenGL 4.6, section 8.13.
 #[inline]

@@ -1,5 +1,5 @@
-//! Lights of a file: how they light a surface. Source: MuJoCo's `render_gl3.c`, version 3.3, and OpenGL 2.1,
-//! section 2.14.1. As there, light and surfaces multiply and add in the values of the file.
+//! Lighting of surfaces by the lights of a file. Source: MuJoCo's `render_gl3.c`, version 3.3, and OpenGL
+//! 2.1, section 2.14.1. Like MuJoCo, it multiplies and adds light and colours as file values (sRGB).
 
 use rapier3d::math::{Pose, Vector};
 
@@ -8,20 +8,20 @@ use super::lanes::Affine;
 use super::power::{file_value, linear_value, power};
 use crate::mjcf::{FileLight, Gloss, Headlight, LightKind, SHININESS};
 
-/// Maximum angle from the direction of a lamp in which it casts shadows.
+/// Maximum angle from a lamp's direction at which it casts shadows.
 const MAX_SHADOW_RAD: f32 = 75.0 * std::f32::consts::PI / 180.0;
-/// Offset of the lookup point along the normal, in texels of a lamp's map at its distance, and the part of
-/// the distance by which it is brought nearer, against self-shadowing.
+/// Offsets of the lookup point against self-shadowing: along the normal, in texels of the lamp's map at the
+/// point's distance; and towards the lamp, as a share of that distance.
 pub const LAMP_NORMAL_TEXELS: f32 = 2.5;
 pub const LAMP_BIAS_SHARE: f32 = 0.002;
 
-/// Surface that is lit, at one point.
+/// Point of a lit surface.
 pub struct LitSurface {
     /// Linear colour.
     pub albedo: Vector,
-    /// Linear colour of the image alone, which multiplies all light; 1 without.
+    /// Linear colour of the image alone, which multiplies all light; 1 without an image.
     pub texture_rgb: Vector,
-    /// Linear colour of emitted light, beside the emission of its gloss.
+    /// Linear colour of light from a layer of emission, in addition to the emission of its gloss.
     pub emitted_rgb: Vector,
     pub gloss: Gloss,
     pub point_m: Vector,
@@ -31,8 +31,8 @@ pub struct LitSurface {
     pub back_direction: Vector,
 }
 
-/// Returns the direction from a point to a light, its distance (0 for directional ones) and the share of its
-/// light that arrives there, without shadows.
+/// Returns the direction from a point to a light, its distance (0 for directional lights), and the share of
+/// its light that reaches the point without shadows.
 #[inline(always)]
 pub fn arriving(light: &FileLight, point_m: Vector) -> (Vector, f32, f32) {
     if light.kind == LightKind::Directional {
@@ -51,8 +51,8 @@ pub fn arriving(light: &FileLight, point_m: Vector) -> (Vector, f32, f32) {
     (towards, distance_m, fall * cone)
 }
 
-/// Returns the linear colour of a surface, with lights at their places; `sunlit` is the share of each that
-/// shadows leave.
+/// Returns the linear colour of a surface under lights in the world frame. `sunlit` gives the share of each
+/// light, by its index, that shadows leave.
 pub fn shown_rgb(
     headlight: &Headlight,
     lights: &[FileLight],
@@ -96,12 +96,13 @@ pub fn shown_rgb(
     linear_light((shown + limited(lit, glossy) + emitted).min(Vector::ONE))
 }
 
-/// Returns the value of the file as linear light.
+/// Converts file values (sRGB) to linear light.
 pub fn linear_light(rgb: Vector) -> Vector {
     Vector::new(linear_value(rgb.x), linear_value(rgb.y), linear_value(rgb.z))
 }
 
-/// Returns a direction to a sun that is not straight up or down, as maps of shadows need it.
+/// Returns the direction to the sun, tilted if it is straight up or down. Shadow maps cannot use a vertical
+/// direction.
 pub fn tilted(sun_direction: Vector) -> Vector {
     const LEAST: f32 = 1e-3;
     let is_upright = sun_direction.x.abs() < LEAST && sun_direction.y.abs() < LEAST;
@@ -120,8 +121,8 @@ pub fn lamp_view(light: &FileLight) -> (Pose, f32) {
     (world_from_camera, 2.0 * half_rad)
 }
 
-/// Returns the map from points of the world to a lamp's map of shadows: column and row, each times the
-/// depth, and depth.
+/// Returns the map from points of the world to a lamp's shadow map: column and row, each times the depth, and
+/// depth.
 pub fn lamp_map(light: &FileLight) -> Affine {
     let (world_from_camera, field_rad) = lamp_view(light);
     let half = 0.5 * TEXELS as f32;

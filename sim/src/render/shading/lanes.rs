@@ -1,14 +1,14 @@
-//! Numbers and maps of points, processed several at once.
+//! Blocks of numbers and points that are processed together.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-/// Count of numbers in the widest registers in common use.
+/// Number of f32 values in the widest registers in common use.
 pub const LANES: usize = 8;
 
 /// A block of numbers, or a smaller one.
 pub type Lanes<const N: usize = LANES> = [f32; N];
 
-/// Computes the numbers of a block. It is a loop, which compilers turn into few instructions.
+/// Computes the numbers of a block in a loop that compilers vectorise.
 #[inline(always)]
 pub fn lanes<T: Copy + Default, const N: usize>(each: impl Fn(usize) -> T) -> [T; N] {
     let mut numbers = [T::default(); N];
@@ -18,7 +18,7 @@ pub fn lanes<T: Copy + Default, const N: usize>(each: impl Fn(usize) -> T) -> [T
     numbers
 }
 
-/// Computes three values, by their axes.
+/// Computes one value for each axis.
 #[inline(always)]
 pub fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
     [each(0), each(1), each(2)]
@@ -28,7 +28,7 @@ pub fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Affine(pub [(Vector, f32); 3]);
 
-/// Points, coordinate by coordinate, in whole blocks: the last one may hold a few meaningless ones.
+/// Points, stored coordinate by coordinate in whole blocks. The last block may end with meaningless points.
 #[derive(Default)]
 pub struct Points {
     count: usize,
@@ -44,7 +44,7 @@ impl Affine {
         Affine([row(0), row(1), row(2)])
     }
 
-    /// Returns the map that first moves a point by `pose` and then by this one.
+    /// Returns the map that applies first `pose` and then this map.
     pub fn after(self, pose: Pose) -> Affine {
         let back = pose.rotation.inverse();
         Affine(self.0.map(|(axis, constant)| (back * axis, constant + axis.dot(pose.translation))))
@@ -72,7 +72,7 @@ impl Affine {
         )
     }
 
-    /// Returns the derivatives of the coordinates in directions.
+    /// Returns the derivatives of the coordinates along directions.
     #[inline(always)]
     pub fn derivatives<const N: usize>(&self, [x, y, z]: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
         axes(
@@ -100,7 +100,7 @@ impl Points {
         self.count
     }
 
-    /// Writes the result of `map` for each point, by the points' numbers.
+    /// Writes the result of `map` for each point, in the points' order.
     #[inline(always)]
     pub fn map_into<const N: usize>(
         &self,

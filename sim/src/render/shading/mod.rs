@@ -1,5 +1,5 @@
-//! Definitions that renderers share: the light, the shadow's map, outlines, patterns, and arithmetic on
-//! several points at once. All colours are linear.
+//! Definitions that renderers share: the light, the shadow map, outlines, patterns, and arithmetic on several
+//! points at once. All colours are linear.
 
 pub mod baked;
 pub mod image;
@@ -15,16 +15,16 @@ use lanes::Affine;
 
 use crate::srgb::linear_light;
 
-/// Maximum number of blended surfaces in front of one another; those behind them are not drawn.
+/// Maximum number of blended surfaces behind one another. Further ones are not drawn.
 pub const VEILS: usize = 4;
 /// Alpha from which surfaces are solid, as in MuJoCo.
 pub const SOLID_ALPHA: f32 = 0.995;
 /// Alpha up to which surfaces cast no shadow: they let half of the light through.
 pub const MAX_CLEAR_ALPHA: f32 = 0.5;
-/// Alpha of texels from which depth and ids are those of the surface.
+/// Minimum alpha of texels that count as surface in depth and ids.
 pub const MIN_SEEN_ALPHA: f32 = 0.5;
 
-/// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
+/// Samples per pixel along each axis; a power of two, so that dividing by it is exact.
 pub const SAMPLES: usize = 2;
 
 /// Light of a scenery, as linear colours: a sun with shadows, and a sky.
@@ -53,30 +53,29 @@ impl Default for Light {
 
 /// Strength of a faint headlight at the camera.
 pub const LAMP: f32 = 0.15;
-/// The sun's reflection: its strength where a surface mirrors the sun to the camera. The exponent of the
-/// cosine is 40.
+/// Peak strength of the sun's specular highlight. The exponent of the cosine is 40.
 pub const HIGHLIGHT: f32 = 0.15;
 /// Background colour.
 pub const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 
-/// Strength of the darkening by an outline between two things.
+/// Strength of the darkening by an outline between two bodies.
 pub const OUTLINE: f32 = 0.45;
-/// Minimum relative depth difference for an outline between two things: there is none where they touch.
+/// Minimum relative depth difference for an outline between two bodies: there is none where they touch.
 pub const OUTLINE_DEPTH_STEP: f32 = 0.02;
 
-/// Texels along each side of the shadow's map: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
+/// Texels along each side of the shadow map: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
 pub const TEXELS: usize = 1024;
-/// Offset of "nearness" in the map, which is this minus the distance from the plane through the focus
-/// that faces the sun. So it grows towards the sun.
+/// Nearness at the focus. Nearness in the shadow map is measured along the direction to the sun, and grows
+/// towards the sun.
 pub const SUN_DISTANCE_M: f32 = 8.0;
 /// Offsets of the lookup point along the surface normal and towards the sun, which prevent self-shadowing.
 pub const NORMAL_OFFSET_M: f32 = 0.006;
 pub const BIAS_M: f32 = 0.004;
 
-/// Distance from the map's border over which shadows fade out, so that no shadow ends in a line.
+/// Distance from the map's border over which shadows fade out, so that no shadow ends abruptly.
 pub const FADE_TEXELS: f32 = 120.0;
 
-/// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.
+/// Texels along each side of the contact map: 1 cm at a focus of 1.25 m.
 pub const CONTACT_TEXELS: usize = 256;
 /// Strength of contact shadows.
 pub const CONTACT: f32 = 0.5;
@@ -100,7 +99,8 @@ pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine 
     Affine([about_focus(right, half), about_focus(down, half), about_focus(sun_direction, SUN_DISTANCE_M)])
 }
 
-/// Returns the share of light that a surface of this alpha keeps out. MuJoCo draws blended surfaces twice.
+/// Returns the share of light from behind that a surface of this alpha blocks. Blended surfaces count twice,
+/// since MuJoCo draws them twice.
 #[inline(always)]
 pub fn opacity(alpha: f32) -> f32 {
     let clear = 1.0 - alpha;

@@ -10,7 +10,7 @@ use crate::mjcf::SurfacePattern;
 pub enum Pattern {
     #[default]
     Plain,
-    /// Squares of half a metre in the world's ground plane; every other one has this colour, sRGB, 0 to 1.
+    /// Squares of half a metre in the world's ground plane; every other square has this colour, sRGB, 0 to 1.
     Checker([f32; 3]),
     /// Grain along the longest side.
     Wood,
@@ -20,13 +20,13 @@ pub enum Pattern {
     Print,
 }
 
-/// The second colour, as a share of the first: calm enough for things on it to stand out.
+/// Second colour as a share of the first. The contrast is low, so that objects on the surface stand out.
 const WOOD_DARK: f32 = 0.70;
 const FABRIC_DARK: f32 = 0.75;
 const INK_DARK: f32 = 0.45;
 
 pub const CHECKER_PER_M: f32 = 2.0;
-/// Broad bands, fine lines, and the displacement of a band along the grain.
+/// Numbers of broad bands and of fine lines per metre, and the displacement of a band along the grain.
 pub const BANDS_PER_M: f32 = 13.0;
 pub const LINES_PER_M: f32 = 41.0;
 pub const STRAY: f32 = 0.4;
@@ -40,7 +40,7 @@ pub const WORD_GAP: f32 = 0.3;
 pub const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
-    /// Returns the pattern that a file gives a material; plain without one.
+    /// Returns the pattern of a material in a file; plain if the file states none.
     pub fn of(stated: Option<SurfacePattern>) -> Pattern {
         match stated {
             Some(SurfacePattern::Wood) => Pattern::Wood,
@@ -62,8 +62,8 @@ impl Pattern {
         }
     }
 
-    /// Returns the map from the world to the frame of the pattern: for a checker it is the world, for
-    /// all others the mesh's with x along the grain.
+    /// Returns the map from the world to the frame of the pattern. This is the world frame for a checker, and
+    /// otherwise the mesh frame with x along the grain.
     pub(in crate::render) fn frame(self, world_from_mesh: Pose, grain: usize) -> Affine {
         if let Pattern::Checker(_) = self {
             return Affine::IDENTITY;
@@ -136,7 +136,8 @@ fn floor(value: f32) -> f32 {
     rounded(value - 0.5)
 }
 
-/// Returns the nearest whole number, up to four million: a larger sum has no digits left for fractions.
+/// Returns the nearest whole number, for values up to four million. The sum with `NO_PARTS` has no bits left
+/// for fractions.
 #[inline(always)]
 fn rounded(value: f32) -> f32 {
     const NO_PARTS: f32 = (3 << 22) as f32;

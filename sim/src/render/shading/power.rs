@@ -1,10 +1,9 @@
-//! Powers of many numbers, in steps that compilers turn into few instructions for several at once, and the
-//! values of files for linear light.
+//! Powers in vectorisable steps, and the conversion between linear light and file values (sRGB).
 
-/// Minimum number whose power is computed. Smaller numbers are replaced by it.
+/// Smallest base of a power. Smaller numbers are replaced by it.
 const LEAST: f32 = 1e-12;
 
-/// Returns a power of a number of at least 0, within a thousandth. An exponent of at most 200 gives a
+/// Returns a power of a non-negative number, within a thousandth. For exponents up to 200 the result is a
 /// normal number.
 #[inline(always)]
 pub fn power(value: f32, exponent_value: f32) -> f32 {
@@ -12,21 +11,21 @@ pub fn power(value: f32, exponent_value: f32) -> f32 {
     exp2(exponent_value * log2(value))
 }
 
-/// Converts linear light to the value of sRGB, in which files store colours.
+/// Converts linear light to sRGB, the colour space of files.
 #[inline(always)]
 pub fn file_value(linear_value: f32) -> f32 {
     let curve = 1.055 * power(linear_value, 1.0 / 2.4) - 0.055;
     if linear_value <= 0.003_130_8 { 12.92 * linear_value } else { curve }
 }
 
-/// Converts a value of a file to linear light.
+/// Converts a file value (sRGB) to linear light.
 #[inline(always)]
 pub fn linear_value(file_value: f32) -> f32 {
     let curve = power((file_value + 0.055) / 1.055, 2.4);
     if file_value <= 0.040_45 { file_value / 12.92 } else { curve }
 }
 
-/// Blends linear light over another as MuJoCo does, in the values of files.
+/// Blends linear light over other linear light in file values (sRGB), like MuJoCo.
 #[inline(always)]
 pub fn blended(behind_value: f32, front_value: f32, share: f32) -> f32 {
     linear_value(file_value(behind_value) * (1.0 - share) + file_value(front_value) * share)
@@ -38,7 +37,7 @@ fn log2(value: f32) -> f32 {
     let bits = value.to_bits();
     let whole = (bits >> 23) as f32 - 127.0;
     let rest = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
-    // Least squares between powers of two, exact at both ends.
+    // A least-squares fit between powers of two, exact at both ends.
     let bend = -0.441_740_3 + rest * (0.266_029_9 + rest * (-0.146_314_34 + rest * 0.044_004_69));
     whole + rest + rest * (rest - 1.0) * bend
 }

@@ -16,7 +16,7 @@ impl Default for SrgbTable {
 }
 
 impl SrgbTable {
-    /// Writes the bytes of pixels whose linear colours are given share by share.
+    /// Writes the bytes of pixels whose linear colours are given channel by channel.
     #[inline(always)]
     pub fn encode(&self, linear_rgb: &[Vec<f32>; 3], bytes: &mut [u8]) {
         for (values, axis) in linear_rgb.iter().zip(0..) {
@@ -40,7 +40,7 @@ impl SrgbTable {
     }
 }
 
-/// Returns a number whose lowest bits are the index in the table.
+/// Returns a float whose lowest bits are the index in the table.
 #[inline(always)]
 fn place(linear_value: f32) -> f32 {
     const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;

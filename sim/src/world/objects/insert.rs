@@ -23,9 +23,9 @@ pub(in crate::world) struct Furniture {
     pub machinery: Machinery,
 }
 
-/// Inserts a scene with its origin at `world_from_scene`. Bodies that no joint moves are its room, the
-/// links of the others become objects. All begin in the key `start`, if there is one. Free bodies may sleep
-/// with `may_sleep`.
+/// Inserts a scene with its origin at `world_from_scene`. Bodies that no joint moves become the room; the
+/// links of the others become objects. All bodies begin in the key `start`, if there is one. Free bodies may
+/// sleep if `may_sleep` is true.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
     scene: &Document,
@@ -71,7 +71,8 @@ pub(in crate::world) fn insert_scene(
 }
 
 /// Inserts an object file: one top-level body, which is a mark if no joint moves it. The body has the
-/// placement's name, and the links on it have their own after it. A free body of the scene is moved instead.
+/// placement's name. The names of links on it are this name followed by their own. If the placement names a
+/// free body of the scene, that body is moved instead.
 pub(in crate::world) fn insert_object(
     dynamics: &mut Dynamics,
     placement: &ObjectPlacement,

@@ -1,4 +1,5 @@
-//! Objects: all named things in a world except robots. A file with inner joints gives one object per link.
+//! Objects: all named bodies and marks in a world except robots. A file with inner joints gives one object
+//! per link.
 
 mod insert;
 #[cfg(test)]
@@ -19,7 +20,7 @@ use crate::mechanism::rounded;
 
 pub(super) use insert::{Furniture, insert_object, insert_scene};
 
-/// An object file put into the world, or a free body of the scene put elsewhere.
+/// Placement of an object file in the world, or of a free body of the scene.
 #[derive(Clone, Debug)]
 pub struct ObjectPlacement {
     /// Name of the object in tasks.
@@ -37,7 +38,7 @@ pub struct ObjectState {
     pub angular_velocity_rad_s: Vector,
 }
 
-/// A named object that is not a robot: a link that moves, or a mark, which only marks a place.
+/// A named object that is not a robot: a moving link, or a mark, which only denotes a place.
 pub(super) struct Object {
     /// Name of the object in tasks.
     pub name: String,

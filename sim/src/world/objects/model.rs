@@ -16,7 +16,7 @@ pub enum ObjectFile {
     Embedded(String),
     /// MJCF that refers to no other files, and its name in messages.
     Text { name: String, mjcf: String },
-    /// A file that was read, with the files that it refers to.
+    /// A parsed file, including the files that it refers to.
     Read(Arc<Document>),
     /// A body of the scene, by its name there; see [`Document::scene_bodies`].
     OfScene { scene: Arc<Document>, body: String },
@@ -37,7 +37,7 @@ pub struct ObjectModel {
     pub sites: Vec<Site>,
     /// Mass of this body alone, without its moving parts.
     pub mass_kg: f32,
-    /// Freedom of the body against the one that carries it; `None` unless it is a hinge or a slide.
+    /// Joint between the body and its carrier; `None` unless it is a hinge or a slide.
     pub opening: Option<Opening>,
     solid: Solid,
 }
@@ -96,7 +96,7 @@ impl ObjectModel {
                 object_from_part,
                 object_from_moved_part: farthest(&link.joint).map(|moved| object_from_part * moved),
                 carrier: link.parent.map(|carrier| parts[carrier].name.clone()),
-                // The place of the file is not known here.
+                // The placement of the file is unknown here.
                 model: match link.parent {
                     Some(_) => ObjectModel::of(link),
                     None => ObjectModel { opening: None, ..ObjectModel::of(link) },
@@ -110,7 +110,7 @@ impl ObjectModel {
         self.sites.iter().find(|site| site.name == name)
     }
 
-    /// Returns the extent of the colliding shapes along a unit vector from the origin, both of the world.
+    /// Returns the maximum coordinate of the colliding shapes along a unit vector, both in the world frame.
     pub fn reach_m(&self, world_from_object: &Pose, direction: Vector) -> f32 {
         self.solid.reach_m(world_from_object, direction)
     }
@@ -137,7 +137,7 @@ impl ObjectModel {
             }
         };
         let mut trees = document.trees()?.into_iter();
-        // The first is the file's own world.
+        // The first tree is the file's own world.
         let world = trees.next().into_iter().flat_map(|world| world.links);
         let (Some(tree), None) = (trees.next(), trees.next()) else {
             return Err(document.unsupported("an object file has one top-level body"));
@@ -170,7 +170,8 @@ impl ObjectModel {
     }
 }
 
-/// Returns the name of a part: that of the object, or its own name after the object's.
+/// Returns the name of a part: the object's name, followed by the part's own name unless it is the first
+/// part.
 pub(super) fn part_name(object: &str, link: &BodyLink) -> String {
     match link.parent {
         None => object.into(),

@@ -1,4 +1,4 @@
-//! Hinges and slides of doors, drawers and the like: how far they are open, from the poses of two bodies.
+//! Hinges and slides, for example of doors and drawers: their opening, from the poses of two bodies.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -58,8 +58,8 @@ fn end(joint: &AxisJoint) -> Option<f32> {
     Some(if low.abs() > high.abs() { low } else { high } as f32)
 }
 
-/// Returns the pose of a part, in its own frame with the joint at 0, at the end of the joint's range that is
-/// farther from 0; `None` if there is no range.
+/// Returns the pose of a part with its joint at the end of the range that is farther from 0. The pose is in
+/// the part's frame with the joint at 0. Returns `None` if there is no range.
 pub(super) fn farthest(joint: &LinkJoint) -> Option<Pose> {
     match joint {
         LinkJoint::Fixed | LinkJoint::Free { .. } => None,

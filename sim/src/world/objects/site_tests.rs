@@ -1,4 +1,4 @@
-//! Objects against their documentation: sites are on shapes or in the open, and objects that robots
+//! Tests of objects against their documentation: sites are on shapes or in the open, and objects that robots
 //! carry have the documented size and mass.
 
 use rapier3d::math::Vector;
@@ -133,7 +133,7 @@ fn the_lowest_point_is_that_of_the_shape_as_it_lies() {
     }
 }
 
-/// Objects that several robots carry, or one with both hands: their extent along each axis, rims
+/// Objects that several robots carry, or one robot with both hands: their extent along each axis, rims
 /// included, and their mass.
 const CARRIED: [(&str, [f32; 3], f32); 5] = [
     ("round_table", [0.80, 0.80, 0.74], 3.55),

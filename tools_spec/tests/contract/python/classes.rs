@@ -1,4 +1,4 @@
-//! Types of the contract as Python's dataclasses.
+//! Types of the contract as Python dataclasses.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::{OF_DEPTH, OF_OBSERVE, OF_PLANS, OF_RESULT, OF_START, described, is_m
 /// Base class of all replies, which parses them.
 const BASE: &str = "Reply";
 
-/// The types of the contract, by the types that contain them.
+/// The types of the contract, grouped by the types that contain them.
 pub struct Contract<'a> {
     types: &'a Map<String, Value>,
     arguments: BTreeSet<String>,
@@ -63,14 +63,14 @@ impl<'a> Contract<'a> {
         Contract { arguments, commands, plans, depth, replies, result, start, ..contract }
     }
 
-    /// Classes and enumerations to which a schema itself refers.
+    /// Returns the classes and enumerations to which a schema refers directly.
     pub fn named_in(&self, schema: &Value) -> Vec<String> {
         let mut found = Vec::new();
         references(schema, &mut found);
         found
     }
 
-    /// Returns all parts of a schema.
+    /// Returns the names of all types that a schema contains, directly or indirectly.
     fn reached(&self, schema: &Value) -> BTreeSet<String> {
         let mut reached = BTreeSet::new();
         let mut next = self.named_in(schema);
@@ -91,7 +91,7 @@ impl<'a> Contract<'a> {
         self.types[name]["properties"].is_object()
     }
 
-    /// Returns true for an enumeration that replies have, too; their modules define it.
+    /// Returns true for an enumeration that also occurs in replies; the modules of replies define it.
     pub fn is_replied(&self, name: &str) -> bool {
         !self.is_class(name)
             && [&self.commands, &self.depth, &self.replies, &self.result]
@@ -99,8 +99,8 @@ impl<'a> Contract<'a> {
                 .any(|names| names.contains(name))
     }
 
-    /// Returns the type of a name that has no class and is no enumeration, for example that of numbers by
-    /// joint.
+    /// Returns the Python type of a name that is neither a class nor an enumeration, for example the type of
+    /// numbers by joint.
     fn plain(&self, name: &str) -> Option<String> {
         let schema = &self.types[name];
         let named = self.is_class(name) || choices(schema).is_some();
@@ -195,7 +195,7 @@ impl<'a> Contract<'a> {
         lines.text()
     }
 
-    /// Imports types of replies from their modules.
+    /// Imports the types of replies from their modules.
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
         for (module, own) in [
             ("commands", &self.commands),
@@ -224,7 +224,7 @@ impl<'a> Contract<'a> {
         values.iter().for_each(|value| lines.add(1, &format!("\"{value}\",")));
         lines.add(0, "]");
         let text = match name {
-            // Schemas only name these, so that lists of tools are short.
+            // Schemas contain only these names, so that lists of tools are short.
             "Color" => "Colour of a surface.".to_owned(),
             "PoseFrame" => "Frame of points and poses; the briefing describes each.".to_owned(),
             _ => described(&self.types[name]),

@@ -1,7 +1,7 @@
-//! The tools as typed Python: classes of arguments and replies, and a method for each tool, in
-//! `gateway/python/tandem/contract`.
+//! The tools as typed Python in `gateway/python/tandem/contract`: classes of arguments and replies, and a
+//! method for each tool.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract python` writes them anew.
+//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract python` rewrites them.
 
 mod classes;
 mod text;
@@ -16,9 +16,10 @@ use classes::Contract;
 use text::{Lines, docstring};
 use types::Parameter;
 
-/// The package's own method returns images as arrays, which JSON Schema cannot express.
+/// The package implements this method itself, because it returns images as arrays, which JSON Schema cannot
+/// express.
 const OBSERVE: &str = "observe";
-/// Replies beside images.
+/// Types in the reply to `observe`, besides images.
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];
 /// Replies to plans and walks.
 const OF_PLANS: &str = "PlanReply";
@@ -56,7 +57,7 @@ fn the_python_package_has_every_tool() {
     }
 }
 
-/// Returns a class with a method for each tool of an episode that a policy of all robots may call.
+/// Returns a class with a method for each tool of an episode that a policy for all robots may call.
 fn methods(contract: &Contract, tools: &[TypedTool]) -> String {
     let offered: Vec<&TypedTool> = tools.iter().filter(|tool| is_method(tool)).collect();
     let parameters = |tool: &TypedTool| types::parameters(&tool.arguments);

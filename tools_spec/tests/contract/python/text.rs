@@ -32,7 +32,7 @@ impl Lines {
     pub fn import(&mut self, module: &str, names: impl Iterator<Item = String>) {
         let names: BTreeSet<String> = names.collect();
         let mut names: Vec<String> = names.into_iter().collect();
-        // Names are sorted as by ruff: classes before functions.
+        // Names are sorted like by ruff: classes before functions.
         names.sort_by_key(|name| (name.starts_with(char::is_lowercase), name.clone()));
         let whole = format!("from .{module} import {}", names.join(", "));
         match names.len() {
@@ -74,7 +74,7 @@ pub fn docstring(lines: &mut Lines, level: usize, text: &str, arguments: &[Strin
     lines.add(level, "\"\"\"");
 }
 
-/// Returns the words of a text in lines of at most `width`; all but the first `hanging` columns in.
+/// Breaks a text into lines of at most `width` characters. All lines but the first are indented by `hanging`.
 fn wrapped(text: &str, width: usize, hanging: usize) -> Vec<String> {
     let text = text.replace('\\', "\\\\").replace("\"\"\"", "'''");
     let mut lines = vec![String::new()];

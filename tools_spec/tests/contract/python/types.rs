@@ -15,7 +15,7 @@ pub struct Parameter {
     pub required: bool,
 }
 
-/// Returns the parameters that arguments have, those that have to be given first.
+/// Returns the parameters for the arguments, with the required ones first.
 pub fn parameters(schema: &Value) -> Vec<Parameter> {
     let properties = schema["properties"].as_object().into_iter().flatten();
     let parameter = |(wire, of): (&String, &Value)| {
@@ -49,7 +49,7 @@ pub fn reference(schema: &Value) -> Option<&str> {
     schema["$ref"].as_str()?.strip_prefix("#/$defs/")
 }
 
-/// Returns a schema without its null, and whether it had one.
+/// Returns a schema without its null, and `true` if it had one.
 pub fn without_null(schema: &Value) -> (Value, bool) {
     if let Some(choices) = schema["anyOf"].as_array() {
         let others: Vec<&Value> = choices.iter().filter(|choice| choice["type"] != "null").collect();
@@ -67,7 +67,7 @@ pub fn without_null(schema: &Value) -> (Value, bool) {
     (schema.clone(), false)
 }
 
-/// Returns the type of a value from a caller.
+/// Returns the type of a value that a caller passes.
 fn argument_type(schema: &Value) -> (String, bool) {
     let (schema, may_be_null) = without_null(schema);
     let kind = match schema["type"].as_str() {
@@ -78,7 +78,7 @@ fn argument_type(schema: &Value) -> (String, bool) {
     (kind, may_be_null)
 }
 
-/// Returns true for an array of numbers, or of such arrays, which NumPy has arrays for.
+/// Returns true for an array of numbers, or of such arrays, which can be NumPy arrays.
 fn is_numbers(schema: &Value) -> bool {
     let items = &schema["items"];
     schema["type"] == "array"

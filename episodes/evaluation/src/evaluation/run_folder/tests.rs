@@ -125,7 +125,7 @@ fn results_of_another_build_are_kept_and_marked() {
     assert_eq!(run.kept(), kept);
     assert_eq!(run.so_far().other_builds, [("0.0.1+older".to_owned(), 1)].into());
     drop(run);
-    // From this moment the folder is a run of this build, which lists the other build.
+    // From now on, the folder belongs to a run of this build, which also lists the other build.
     assert_eq!(EvaluationRun::begin(&own, folder.path()).unwrap().kept(), kept);
 }
 
@@ -146,7 +146,7 @@ fn a_run_is_deleted_where_that_is_asked_for_and_nobody_plays_it() {
     assert!(!folder.path().join("episodes/handover-1.json").exists());
     assert!(folder.path().join("notes.txt").exists());
 
-    // A folder that was never a run is not deleted.
+    // A folder that does not contain a run is not deleted.
     let foreign = tempfile::tempdir().unwrap();
     std::fs::create_dir(foreign.path().join("episodes")).unwrap();
     std::fs::write(foreign.path().join("episodes/Cargo.toml"), "").unwrap();
@@ -154,7 +154,7 @@ fn a_run_is_deleted_where_that_is_asked_for_and_nobody_plays_it() {
     assert!(foreign.path().join("episodes/Cargo.toml").exists());
 }
 
-/// A policy that counts the episodes that it plays.
+/// A policy that counts the episodes it plays.
 #[derive(Debug, Default)]
 struct CountingPolicy(AtomicUsize);
 
@@ -165,7 +165,7 @@ impl Policy for CountingPolicy {
 
     fn play_episode(&self, spec: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.0.fetch_add(1, Ordering::Relaxed);
-        // Long enough for the others to reach this episode.
+        // Long enough for the other processes to reach this episode.
         std::thread::sleep(Duration::from_millis(20));
         let result = result(&spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]);
         Ok(PlayOutcome { result, thought: Default::default(), stopped: None })

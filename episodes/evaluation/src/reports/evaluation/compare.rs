@@ -9,16 +9,16 @@ use super::policy::PolicyGroup;
 use crate::results::PlayedEpisode;
 use crate::statistics::{Pairs, mcnemar, newcombe};
 
-/// The second policy against the first.
+/// Comparison of the second policy with the first.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
     pub first: String,
     pub second: String,
-    /// The rows of each task, then those of all tasks together.
+    /// The rows of each task, then the rows of all tasks together.
     pub rows: Vec<PairedRow>,
 }
 
-/// One phase of one task or of all.
+/// One phase of one task, or of all tasks together.
 #[derive(Debug, Serialize)]
 pub struct PairedRow {
     /// `None` for all tasks together.
@@ -28,7 +28,7 @@ pub struct PairedRow {
     /// True if it is the task's last phase.
     pub last: bool,
     pub pairs: Pairs,
-    /// Rate of the second policy minus that of the first.
+    /// Success rate of the second policy minus that of the first.
     pub difference_share: f64,
     /// Newcombe's 95 % interval of the difference.
     pub interval_share: [f64; 2],
@@ -36,7 +36,7 @@ pub struct PairedRow {
     pub mcnemar_p_value: f64,
 }
 
-/// Episodes by task, hash of its file, seed and start phase; the first of several.
+/// Episodes by task, hash of the task file, seed and start phase; the first one if there are several.
 type Episodes<'a> = BTreeMap<(&'a str, Option<&'a str>, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {
@@ -69,8 +69,8 @@ fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
     found
 }
 
-/// Returns the row of a phase; `None` if the two policies share no such episode. An episode that began at a
-/// phase counts for that phase alone.
+/// Returns the row of a phase; `None` if the policies have no such episode in common. An episode that began
+/// at a phase counts only for that phase.
 fn row(
     task: Option<&str>,
     phase: usize,

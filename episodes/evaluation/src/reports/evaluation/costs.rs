@@ -1,4 +1,4 @@
-//! Costs of episodes: steps, calls and thinking time, and, if notes report them, tokens, price and time of
+//! Costs of episodes: steps, calls and thinking time. If notes report them, also tokens, price and time of
 //! models.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,7 +7,7 @@ use crate::results::PlayedEpisode;
 use serde::Serialize;
 use tandem_tools_spec::{AgentEnding, Usage};
 
-/// Costs of whole episodes.
+/// Costs of episodes that began at the task's beginning.
 #[derive(Debug, Serialize)]
 pub struct EpisodeCosts {
     pub steps: ValueRange,
@@ -23,21 +23,21 @@ pub struct ValueRange {
     pub max: f64,
 }
 
-/// Model costs from the notes of a policy's whole episodes, each an episode's sum.
+/// Model costs from the notes of a policy's whole episodes. Each value is the sum over an episode.
 #[derive(Debug, Serialize)]
 pub struct ModelCosts {
     /// Number of episodes that have notes.
     pub episodes: usize,
-    /// Tokens that were read, including those from a cache.
+    /// Input tokens, including those read from a cache.
     pub input_tokens: ValueRange,
     pub output_tokens: ValueRange,
-    /// Share of the read tokens that came from a cache; `None` if none were read.
+    /// Share of the input tokens that were read from a cache; `None` without input tokens.
     pub cached_share: Option<f64>,
-    /// Price; `None`, like the next two, if no note reports it.
+    /// Price in US dollars; `None` if no note reports it.
     pub usd: Option<ValueRange>,
-    /// Price of all episodes.
+    /// Sum of the prices of all episodes.
     pub total_usd: Option<f64>,
-    /// Time that models took.
+    /// Response time of models in seconds; `None` if no note reports it.
     pub model_time: Option<ValueRange>,
     pub models: BTreeSet<String>,
 }
@@ -65,21 +65,21 @@ impl ModelCosts {
     }
 }
 
-/// Model costs of episodes that count, and of those that do not, which are paid for as well.
+/// Model costs of episodes that count, and of those that do not count but were paid for as well.
 #[derive(Debug, Serialize)]
 pub struct AskedCosts {
     pub counted: CostSum,
     pub not_counted: CostSum,
-    /// Number of endings of the play of models, by episode and model, whether the episode counts or not.
+    /// Number of endings by kind, one for each episode and model, whether the episode counts or not.
     pub endings: BTreeMap<AgentEnding, usize>,
 }
 
-/// Sum of the notes of some episodes.
+/// Sum of the costs that notes report.
 #[derive(Debug, Default, Serialize)]
 pub struct CostSum {
     /// Number of episodes that have notes.
     pub episodes: usize,
-    /// Tokens that were read, including those from a cache.
+    /// Input tokens, including those read from a cache.
     pub input_tokens: u64,
     pub output_tokens: u64,
     /// `None` if no note reports it.

@@ -5,7 +5,7 @@ use super::policy::TaskReport;
 use super::rate::Rate;
 use super::{EvaluationReport, stress};
 
-/// Returns a line for each rate of each phase, for further computation.
+/// Returns a line for each rate of each phase, for further analysis.
 pub fn rates(report: &EvaluationReport) -> String {
     let mut text = String::from(
         "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,\

@@ -1,5 +1,5 @@
-//! Header of a report: the command that has made it, each policy's settings, and the processes that have
-//! played.
+//! Header of a report: the command that has created it, the settings of each policy, and the processes that
+//! have played the episodes.
 
 use std::time::SystemTime;
 
@@ -15,11 +15,11 @@ use crate::results::{PlayedEpisode, SeedList, command_line, utc_text};
 /// Origin of a report and of its episodes.
 #[derive(Debug, Serialize)]
 pub struct ReportHeader {
-    /// `None` in a report that no command has made.
+    /// `None` if the report was not created by a command.
     pub made: Option<ReportOrigin>,
-    /// Settings of each policy, in the order of the policies.
+    /// Settings of each policy, in the order of the report's policies.
     pub settings: Vec<RunSettings>,
-    /// Processes that have played in the folders; earlier builds and servers do not record theirs.
+    /// Processes that have played in the folders. Earlier builds and servers do not record theirs.
     pub processes: Vec<FolderProcess>,
 }
 
@@ -38,7 +38,7 @@ pub struct ReportOrigin {
 pub struct RunSettings {
     pub policy: String,
     pub tasks: Vec<String>,
-    /// All seeds, of any of the tasks.
+    /// Seeds of all tasks together.
     pub seeds: SeedList,
     /// Number of episodes that count.
     pub episodes: usize,
@@ -53,17 +53,17 @@ pub struct RunSettings {
     pub state_estimate: &'static str,
     pub sensors: &'static str,
     pub build: String,
-    /// Times at which the first and the last episode ended, in UTC; `None` if no result has them.
+    /// Times at which the first and the last episode ended, in UTC; `None` if no result states them.
     pub ended_at: Option<[String; 2]>,
 }
 
 impl ReportOrigin {
-    /// Describes a report that this process makes now.
+    /// Describes the origin of a report that this process creates now.
     pub fn here(build: &str) -> ReportOrigin {
         ReportOrigin { command: command_line(), build: build.into(), written_at: utc_text(SystemTime::now()) }
     }
 
-    /// Describes the origin in a sentence, with code between backticks.
+    /// Describes the origin in a sentence with code in backticks.
     pub fn in_words(&self) -> String {
         let ReportOrigin { command, build, written_at } = self;
         format!("Made by `{command}` at {written_at}, build `{build}`.")
@@ -102,14 +102,15 @@ impl RunSettings {
     }
 }
 
-/// Returns the times at which the first and the last of these episodes ended; `None` if no result has them.
+/// Returns the times at which the first and the last of these episodes ended; `None` if no result states
+/// them.
 pub fn ended_between(played: &[&PlayedEpisode]) -> Option<[String; 2]> {
     // Times in the same format sort like their texts.
     let times = || played.iter().filter_map(|played| played.ended_at.clone());
     Some([times().min()?, times().max()?])
 }
 
-/// Formats a span of times as one or two days, for example `2026-11-28`.
+/// Formats a time span as one or two dates, for example `2026-11-28`.
 pub fn days([first, last]: &[String; 2]) -> String {
     let day = |time: &str| time.split('T').next().unwrap_or_default().to_owned();
     let (first, last) = (day(first), day(last));

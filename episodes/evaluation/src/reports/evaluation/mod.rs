@@ -1,5 +1,5 @@
-//! Reports on played episodes: rates with intervals, averages, effort, causes of failures, and comparisons
-//! of policies on the same seeds. A report is a self-contained page, or text.
+//! Reports on played episodes: rates with intervals, averages, effort, causes of failures, and comparisons of
+//! policies on the same seeds. A report is a self-contained page or a text.
 
 mod compare;
 mod costs;
@@ -48,28 +48,28 @@ pub use went_wrong::{FailureMoment, failure_moments};
 #[derive(Debug, Serialize)]
 pub struct EvaluationReport {
     pub header: ReportHeader,
-    /// The policies in the order in which they were found.
+    /// The policies, in the order in which they were found.
     pub policies: Vec<PolicyReport>,
-    /// Each policy against the first.
+    /// Comparisons of each policy with the first.
     pub comparisons: Vec<Comparison>,
     /// Results of policies that were also played under stress.
     pub stress: Vec<StressReport>,
-    /// Floors of these tasks without perception.
+    /// Floors of the played tasks, which policies without perception reach.
     pub floors: Vec<TaskFloor>,
     /// Published rates of the same tasks in another simulator.
     pub published: Vec<PublishedRates>,
     pub published_averages: Vec<PublishedAverages>,
     /// Moments at which recorded failures went wrong, up to a limit on their number.
     pub failure_moments: Vec<FailureMoment>,
-    /// Number of failures that were recorded, listed or not.
+    /// Number of recorded failures, listed or not.
     pub recorded_failures: usize,
     /// One row for each episode.
     pub episodes: Vec<EpisodeRow>,
-    /// Files that are no episodes, with the reasons.
+    /// Files that contain no episode, with the reasons.
     pub skipped: Vec<String>,
 }
 
-/// Format of a report as a text.
+/// Format of a report that is text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportFormat {
     Html,
@@ -77,7 +77,7 @@ pub enum ReportFormat {
     Csv,
     Json,
     Tex,
-    /// A line for each episode.
+    /// One line for each episode.
     EpisodesCsv,
     /// Figure of the rates of phases.
     Svg,
@@ -117,7 +117,7 @@ impl EvaluationReport {
     pub fn of(loaded: &LoadedEpisodes) -> EvaluationReport {
         let all = || loaded.episodes.iter();
         let plain = all().filter(|found| found.played.spec.stress.is_none());
-        // If all episodes are under stress, they are reported like plain ones.
+        // If all episodes are under stress, they are reported like episodes without stress.
         let groups = match plain.clone().next() {
             Some(_) => policy::groups(plain),
             None => policy::groups(all()),
@@ -147,7 +147,7 @@ impl EvaluationReport {
         }
     }
 
-    /// Writes the report; `pictures` are for pages only.
+    /// Writes the report. Only pages contain `pictures`.
     pub fn write(
         &self,
         format: ReportFormat,
@@ -170,7 +170,8 @@ impl EvaluationReport {
         episodes::parquet(&self.episodes)
     }
 
-    /// Returns the tasks that any policy has played, in the order of the list of tasks, then those of files.
+    /// Returns the tasks that any policy has played, in the order of the task list, followed by tasks from
+    /// files.
     fn tasks(&self) -> Vec<&str> {
         let played = || self.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task.as_str());
         let known = tasks::cohub().iter().map(|task| task.id.as_str());

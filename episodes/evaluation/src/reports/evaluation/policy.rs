@@ -17,14 +17,14 @@ use super::rate::{MeanRate, Rate};
 use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 use crate::statistics::Count;
 
-/// Episodes of one policy, under one set of rules and on one build.
+/// Episodes of one policy, with the same rules and build.
 pub struct PolicyGroup<'a> {
     pub name: String,
     /// Episodes that count.
     pub episodes: Vec<&'a FoundEpisode>,
-    /// Episodes that do not count and have not been played again.
+    /// Episodes that do not count and were not played again.
     pub excluded: Vec<&'a PlayedEpisode>,
-    /// Episodes that do not count and have been played again elsewhere.
+    /// Episodes that do not count and were played again elsewhere.
     pub superseded: Vec<&'a PlayedEpisode>,
 }
 
@@ -38,24 +38,24 @@ pub struct PolicyReport {
     pub protocol: &'static str,
     pub locomotion: String,
     pub build: String,
-    /// Number of episodes that count. The figures refer to these, unless they are about excluded episodes.
+    /// Number of episodes that count. All figures except those about excluded episodes refer to them.
     pub episodes: usize,
     pub falls: u32,
-    /// The tasks that were played, in the order of the list of tasks.
+    /// The tasks that were played, in the order of the task list.
     pub tasks: Vec<TaskReport>,
-    /// Averages over the tasks of two robots, and over those of three.
+    /// Averages over the tasks for two robots, and over the tasks for three.
     pub averages: Vec<TaskAverage>,
-    /// Rates by collaboration over the tasks of two robots, as in the benchmark, then over those of three;
-    /// each if it was played.
+    /// Rates by collaboration: over the tasks for two robots, as in the benchmark, then over the tasks for
+    /// three. Only task sets that were played have an entry.
     pub together: Vec<ByCollaboration>,
     /// Rates of single phases; `None` if no episodes began at phases.
     pub phase_level: Option<PhaseLevel>,
-    /// Extra information that it was shown beyond the benchmark's own policies.
+    /// Information that the policy was shown, but that the benchmark withholds from its own policies.
     pub shown: Vec<ShownReport>,
     pub reasons: Vec<FailureReason>,
-    /// Episodes that are no evidence of the policy's performance.
+    /// Episodes that are excluded as evidence of the policy's performance, by reason.
     pub excluded: Vec<ExcludedEpisodes>,
-    /// Episodes that were played more than once, because earlier attempts did not count.
+    /// Episodes that were played more than once because earlier attempts did not count.
     pub played_again: Vec<RepeatedEpisode>,
     /// Total model costs; `None` if no notes report them.
     pub asked: Option<AskedCosts>,
@@ -66,14 +66,14 @@ pub struct PolicyReport {
 pub struct TaskReport {
     pub task: String,
     pub robots: usize,
-    /// Number of episodes that began at the task's own beginning.
+    /// Number of episodes that began at the task's beginning.
     pub episodes: usize,
     pub phases: Vec<PhaseReport>,
     pub effort: Option<EpisodeCosts>,
     /// Model costs; `None` if no notes report them.
     pub models: Option<ModelCosts>,
     pub falls: u32,
-    /// Mean share of the joint targets beyond the joints' limits; `None` if there were none.
+    /// Mean share of the joint targets beyond the joints' limits; `None` if no target was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints_clamped_share: Option<f64>,
 }
@@ -88,7 +88,7 @@ pub struct PhaseReport {
     pub collaborative: bool,
     /// Rate among all episodes.
     pub cumulative: Option<Rate>,
-    /// Simulated times at which these episodes reached it, in ascending order.
+    /// Simulated times at which whole episodes reached the phase, in ascending order.
     pub reached_s: Vec<f64>,
     /// Rate among the episodes that reached the previous phase.
     pub conditional: Option<Rate>,
@@ -96,7 +96,7 @@ pub struct PhaseReport {
     pub from_its_beginning: Option<Rate>,
 }
 
-/// Mean rates over the tasks of one number of robots, phase by phase.
+/// Mean rates of each phase over the tasks for one number of robots.
 #[derive(Debug, Serialize)]
 pub struct TaskAverage {
     pub robots: usize,
@@ -104,8 +104,8 @@ pub struct TaskAverage {
     pub phases: Vec<Option<MeanRate>>,
 }
 
-/// Mean conditional rates of phases on which robots work together, and of the others, over the tasks of one
-/// number of robots.
+/// Mean conditional rates over the tasks for one number of robots: of the phases on which robots collaborate,
+/// and of all other phases.
 #[derive(Debug, Serialize)]
 pub struct ByCollaboration {
     pub robots: usize,
@@ -113,14 +113,14 @@ pub struct ByCollaboration {
     pub together: Option<MeanRate>,
 }
 
-/// One kind of information that the benchmark's own policies are not shown.
+/// One kind of information that the benchmark withholds from its own policies.
 #[derive(Debug, Serialize)]
 pub struct ShownReport {
     /// The name in results, for example `odometry`.
     pub what: String,
     /// Number of counted episodes that showed it.
     pub episodes: usize,
-    /// Number of replies that showed it, by the robot concerned.
+    /// Number of replies that showed it, by the robot that the information is about.
     pub replies: BTreeMap<String, u32>,
 }
 
@@ -128,13 +128,13 @@ pub struct ShownReport {
 #[derive(Debug, Serialize)]
 pub struct FailureReason {
     pub task: String,
-    /// Number of the first phase that counts and was not reached.
+    /// Number of the first counted phase that was not reached.
     pub phase: String,
     pub why: String,
     pub seeds: Vec<u32>,
 }
 
-/// Episodes that do not count, for one reason.
+/// Episodes that do not count, for the same reason.
 #[derive(Debug, Serialize)]
 pub struct ExcludedEpisodes {
     pub task: String,
@@ -148,13 +148,13 @@ pub struct ExcludedEpisodes {
 pub struct RepeatedEpisode {
     pub task: String,
     pub seed: u32,
-    /// Causes of the earlier attempts' failures, the oldest first.
+    /// Causes of the earlier attempts' failures, oldest first.
     pub earlier: Vec<String>,
     /// Outcome of the last attempt.
     pub last: String,
 }
 
-/// Groups episodes by policy, in the order in which they were found, with distinct names.
+/// Groups episodes by policy, in the order in which policies were found. The groups have distinct names.
 pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<PolicyGroup<'a>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
     for found in episodes {
@@ -202,8 +202,8 @@ impl<'a> PolicyGroup<'a> {
     }
 }
 
-/// Returns the properties that episodes of one policy share: its name first, then all that may distinguish
-/// policies of the same name.
+/// Returns the properties that all episodes of one policy share: the policy's name, followed by everything
+/// that may distinguish policies of the same name.
 pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
@@ -213,7 +213,7 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
         named(&card.full_name(), &spec.peculiarities()),
         address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
-        // Departures contain only the names of files. Their contents or folders may differ.
+        // Departures contain only file names. Files of one name may differ in content or folder.
         played.locomotion.clone(),
         spec.robot.name(),
         spec.scene.as_ref().map(|scene| format!("scene {}", scene.xxh3)).unwrap_or_default(),
@@ -222,8 +222,7 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     ]
 }
 
-/// Splits the addresses off a policy's name, for example `openpi` and the address of
-/// `openpi:ws://host:8000`.
+/// Splits a policy's name at its address: `openpi:ws://host:8000` into `openpi` and `ws://host:8000`.
 fn split_address(name: &str) -> (&str, Option<&str>) {
     let parts = name.split_once(':').filter(|(_, address)| {
         let scheme = address.split_once("://").map_or("", |(scheme, _)| scheme);
@@ -232,7 +231,7 @@ fn split_address(name: &str) -> (&str, Option<&str>) {
     parts.map_or((name, None), |(name, address)| (name, Some(address)))
 }
 
-/// Returns a short name for a policy's settings.
+/// Returns a short label for a policy's settings.
 fn settings_of(card: &PolicyCard) -> String {
     let text = card.settings.as_ref().map(Value::to_string).unwrap_or_default();
     format!("settings {:06x}", xxh3_64(text.as_bytes()) & 0xff_ffff)
@@ -307,8 +306,8 @@ impl TaskReport {
     }
 }
 
-/// Returns the mean share of the joint targets of these episodes beyond the joints' limits; `None` if there
-/// were none.
+/// Returns the mean share of joint targets beyond the joints' limits in these episodes; `None` if no target
+/// was.
 fn mean_clamped_share(episodes: &[&PlayedEpisode]) -> Option<f64> {
     let shares: Vec<f64> =
         episodes.iter().map(|one| one.result.joints_clamped_share.unwrap_or_default()).collect();
@@ -333,7 +332,7 @@ fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {
 }
 
 impl ByCollaboration {
-    /// Creates the means; `None` if no phase of such a task has a conditional rate.
+    /// Creates the means; `None` if no phase of the tasks has a conditional rate.
     fn of(tasks: &[TaskReport], robots: usize) -> Option<ByCollaboration> {
         let mean = |together: bool| {
             let phases = tasks.iter().filter(|task| task.robots == robots).flat_map(|task| &task.phases);
@@ -387,8 +386,8 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     reasons
 }
 
-/// Returns at most `most` failures for which `wanted` returns `true`, with their policies, in turns from
-/// every policy and task.
+/// Returns at most `most` failures for which `wanted` returns `true`, with their policies. They are taken in
+/// turn from each policy and task.
 pub fn failed_by_turns(
     loaded: &LoadedEpisodes,
     most: usize,
@@ -414,7 +413,7 @@ pub fn failed_by_turns(
     order.into_iter().map(|index| all[index].clone()).collect()
 }
 
-/// Returns the episodes of a policy that count and failed.
+/// Returns the failed episodes of a policy that count.
 pub fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
     group.episodes.iter().copied().filter(|found| !found.played.succeeded()).collect()
 }
@@ -434,8 +433,8 @@ fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
     listed
 }
 
-/// Lists the episodes that were played again. This reveals a policy that fails itself when it is about to
-/// lose, and wins another time.
+/// Lists the episodes that were played again. This reveals a policy that crashes when it is about to fail and
+/// succeeds in a later attempt.
 fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
     let counted = group.episodes.iter().map(|found| &found.played);
     let repeated = counted.chain(group.excluded.iter().copied()).filter_map(|played| {
@@ -467,15 +466,15 @@ fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
     repeated.collect()
 }
 
-/// Returns the number of the first phase that counts and was not reached.
+/// Returns the number of the first counted phase that was not reached.
 pub fn first_missed_phase(played: &PlayedEpisode) -> String {
     let counts = |phase: &usize| played.start_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);
     phases.find(|phase| !played.reached(*phase)).map(Phase::number).unwrap_or_default()
 }
 
-/// Returns the policy's own reason, or else the reason why the episode ended, followed by the number of
-/// falls.
+/// Returns the policy's own reason, or else the reason why the episode ended. The number of falls is
+/// appended.
 pub fn failure_cause(played: &PlayedEpisode) -> String {
     let ended = match played.result.ended {
         EndReason::TaskComplete => "the task was completed",
@@ -490,7 +489,7 @@ pub fn failure_cause(played: &PlayedEpisode) -> String {
         .note
         .clone()
         .filter(|note| Some(note) != missed_phase_note(&played.result, played.start_phase()).as_ref());
-    // A model's own words differ from episode to episode.
+    // Free text from a model differs between episodes.
     let why = played.result.model_endings().or(own).unwrap_or_else(|| ended.into());
     match played.result.falls {
         0 => why,

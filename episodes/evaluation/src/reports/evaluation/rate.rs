@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::statistics::{Count, clopper_pearson, mean_share};
 
-/// Rate of success of at least one trial.
+/// Success rate over at least one trial.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
     pub successes: usize,
@@ -36,7 +36,7 @@ impl Rate {
     }
 }
 
-/// A mean of rates that each count the same.
+/// Mean of rates with equal weights.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeanRate {
     pub counts: Vec<Count>,
@@ -46,7 +46,7 @@ pub struct MeanRate {
 }
 
 impl MeanRate {
-    /// Returns the mean of the rates that have trials; `None` if none has.
+    /// Returns the mean of the rates that have trials; `None` if no rate has trials.
     pub fn of(counts: impl Iterator<Item = Count>) -> Option<MeanRate> {
         let counts: Vec<Count> = counts.filter(|count| count.trials > 0).collect();
         let (mean_share, interval_share) = mean_share(&counts)?;
@@ -74,7 +74,7 @@ pub fn p_text(p_value: f64) -> String {
     if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
 }
 
-/// Formats a share in percent with one decimal, which is left out if it is zero.
+/// Formats a share in percent with one decimal, which is omitted if it is zero.
 pub fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
     // A value that rounds to zero has no sign.

@@ -1,5 +1,5 @@
-//! Robustness of policies: rates under stress beside those of the same seeds without, and the most harmful
-//! axis.
+//! Robustness of policies: rates under stress, compared with rates on the same seeds without stress, and the
+//! most harmful axis.
 
 use std::collections::BTreeMap;
 
@@ -17,21 +17,21 @@ use crate::reports::table::{NONE, Table};
 use crate::results::PlayedEpisode;
 use crate::statistics::{Count, Pairs, mcnemar, newcombe};
 
-/// Results of one policy under stress. Rates refer to the last phase.
+/// Results of one policy under stress. Rates are those of the last phase.
 #[derive(Debug, Serialize)]
 pub struct StressReport {
     /// The policy's name without stress.
     pub policy: String,
     pub protocol: &'static str,
-    /// Its rate without stress; `None` if no such episode was played.
+    /// Rate without stress; `None` if no such episode was played.
     pub plain: Option<Rate>,
-    /// All tasks together, by axis and level; then each task.
+    /// Rows of all tasks together, by axis and level, followed by rows of each task.
     pub rows: Vec<StressRow>,
-    /// The axis with the largest loss of rate, averaged over the played levels.
+    /// Axis with the largest loss of rate, averaged over the levels that were played.
     pub hurts_most: Option<AxisLoss>,
 }
 
-/// One axis and level, of one task or of all.
+/// One axis and level, for one task or for all tasks together.
 #[derive(Debug, Serialize)]
 pub struct StressRow {
     /// `None` for all tasks together.
@@ -49,7 +49,7 @@ pub struct StressRow {
 /// Rates of the same episodes with and without stress.
 #[derive(Debug, Serialize)]
 pub struct PairedLoss {
-    /// Pairs of outcomes: without stress, and with it.
+    /// Pairs of outcomes: without stress, then under stress.
     pub pairs: Pairs,
     /// Rate under stress minus rate without.
     pub difference_share: f64,
@@ -59,18 +59,18 @@ pub struct PairedLoss {
     pub mcnemar_p_value: f64,
 }
 
-/// Loss of rate on an axis.
+/// Loss of rate on one axis.
 #[derive(Debug, Serialize)]
 pub struct AxisLoss {
     pub axis: StressAxis,
-    /// Mean of the differences of its levels.
+    /// Mean difference over the levels of the axis.
     pub difference_share: f64,
 }
 
 /// A task, the hash of its file, and a seed.
 type EpisodeKey<'a> = (&'a str, Option<&'a str>, u32);
 
-/// Reports on the policies that were played under stress, in the order in which they were found.
+/// Reports on the policies that were played under stress, in the order in which policies were found.
 pub fn stress_reports<'a>(episodes: impl Iterator<Item = &'a FoundEpisode> + Clone) -> Vec<StressReport> {
     let mut policies: Vec<(Vec<String>, Vec<&PlayedEpisode>)> = Vec::new();
     let whole = episodes.clone().map(|found| &found.played).filter(|played| played.spec.start == Start::Task);
@@ -92,7 +92,7 @@ pub fn stress_reports<'a>(episodes: impl Iterator<Item = &'a FoundEpisode> + Clo
     reports.filter(|report| !report.rows.is_empty()).collect()
 }
 
-/// Returns the properties that episodes of one policy share under any stress.
+/// Returns the properties that all episodes of one policy share, with and without stress.
 fn without_stress(played: &PlayedEpisode) -> Vec<String> {
     match played.spec.stress {
         None => rules_of(played),
@@ -152,7 +152,7 @@ impl StressReport {
         }
     }
 
-    /// Returns the rows of all tasks together, with the variants of an axis combined.
+    /// Returns the rows of all tasks together, with an axis's variants combined.
     pub fn overall(&self) -> impl Iterator<Item = &StressRow> {
         self.rows.iter().filter(|row| row.task.is_none() && row.kind.is_none())
     }
@@ -210,7 +210,7 @@ impl PairedLoss {
         })
     }
 
-    /// Formats the difference and its interval in points.
+    /// Formats the difference and its interval in percentage points.
     pub fn text(&self) -> String {
         let [low, high] = self.interval_share.map(signed);
         format!("{} [{low}, {high}]", signed(self.difference_share))
@@ -229,7 +229,7 @@ fn hurts_most(rows: &[StressRow]) -> Option<AxisLoss> {
     losses.min_by(|one, other| one.difference_share.total_cmp(&other.difference_share))
 }
 
-/// Returns the tables of one policy: all tasks together, then task by task.
+/// Returns the tables of one policy: all tasks together, then each task.
 pub fn tables(report: &StressReport) -> [Table; 2] {
     [overall_table(report), task_table(report)]
 }
@@ -305,7 +305,7 @@ fn task_table(report: &StressReport) -> Table {
     table
 }
 
-/// Returns a line for each rate of each task, in the format of the CSV's other lines.
+/// Returns a line for each rate of each task, in the same format as the other lines of the CSV file.
 pub fn csv_lines(report: &StressReport, quoted: &dyn Fn(&str) -> String) -> Vec<String> {
     let line = |row: &StressRow| {
         let task = tasks::built_in().find(|task| row.task.as_ref() == Some(&task.id))?;
@@ -327,8 +327,8 @@ mod tests {
     use crate::reports::evaluation::{EvaluationReport, ReportFormat, ReportPictures, load};
     use tandem_episodes::stress::StressLevel;
 
-    /// Returns a report on twenty seeds of Handover: without stress, where 18 succeed, and under two axes at
-    /// two levels.
+    /// Returns a report on twenty seeds of Handover. Without stress, 18 succeed. Stress is on two axes: push
+    /// at two levels, and partner at one.
     fn under_stress() -> EvaluationReport {
         let task = tasks::find("handover").unwrap();
         let episode = |stress: Option<(StressAxis, StressLevel)>, seed: u32, succeeds: bool| {
@@ -362,12 +362,12 @@ mod tests {
         assert!((paired.mcnemar_p_value - 2.0 / 4096.0).abs() < 1e-9);
         let most = stress.hurts_most.as_ref().unwrap();
         assert_eq!((most.axis, percent(most.difference_share)), (StressAxis::Push, "-35".into()));
-        // Seeds take turns among a partner's kinds of failure.
+        // Seeds cycle through the kinds of a partner's failure.
         let kinds = stress.rows.iter().filter(|row| row.kind.is_some());
         assert_eq!(kinds.map(|row| row.rate.trials).collect::<Vec<_>>(), [4; 5]);
     }
 
-    /// Folder layout of `evaluate --stress`: an evaluation in the folder of the plain one.
+    /// Folder layout of `evaluate --stress`: stress evaluations are in the folder of the plain evaluation.
     #[test]
     fn what_lies_in_the_folder_of_the_plain_run_is_found() {
         let folder = tempfile::tempdir().unwrap();
@@ -383,7 +383,7 @@ mod tests {
         let [stress] = &report.stress[..] else { panic!("{:?}", report.stress) };
         let paired = stress.overall().next().unwrap().paired.as_ref().unwrap();
         assert_eq!((report.policies[0].episodes, paired.pairs.both), (1, 1));
-        // The folder of one axis and level alone is reported like any other.
+        // The folder of a single axis and level is reported like any other.
         let alone = EvaluationReport::of(&load(&[folder.path().join("stress/push-1")]).unwrap());
         assert_eq!(alone.policies[0].name, "agent + stress: push-1");
     }

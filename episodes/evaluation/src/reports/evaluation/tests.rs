@@ -58,7 +58,7 @@ pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpis
     }
 }
 
-/// Returns ten episodes of Handover. Nine, six and three of them reach its phases.
+/// Returns ten episodes of Handover. Nine, six and three of them reach phases 1, 2 and 3.
 pub fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
@@ -200,8 +200,8 @@ fn joint_targets_beyond_limits_are_told_where_there_were_some() {
     assert!(text(&episodes).contains("| agent | handover | 34 |"), "{}", text(&episodes));
 }
 
-/// Extra information that a policy was shown in some of its episodes is named and counted. The policy still
-/// counts as the same one.
+/// Information that only some episodes showed to a policy is named and counted. The episodes still belong to
+/// one policy.
 #[test]
 fn what_was_shown_beyond_the_benchmark_is_told() {
     let mut episodes = nine_six_three("agent");
@@ -216,7 +216,7 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
     episodes.push(told_all);
     let report = EvaluationReport::of(&found(episodes));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
-    // The level `full` includes odometry, which is not repeated beside it.
+    // The level `full` includes odometry, so the name does not list odometry.
     assert_eq!(names, ["agent + pixel_depth", "other + depth_images + assistance: full"]);
     let shown = |policy: &PolicyReport| -> Vec<(String, usize, Vec<u32>)> {
         let shown = policy.shown.iter();
@@ -231,7 +231,7 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
     assert!(page.contains("Shown beyond the benchmark") && page.contains("A 6, B 2"), "{page}");
 }
 
-/// Tasks of three robots have means of their own, in every format.
+/// Tasks for three robots have separate means in every format.
 #[test]
 fn means_of_phases_are_by_number_of_robots() {
     let begun = |task: &str, seed: u32, phase: usize, phases: usize| {
@@ -267,7 +267,7 @@ fn means_of_phases_are_by_number_of_robots() {
     }
 }
 
-/// Tests every format with a policy whose name has to be escaped everywhere.
+/// Tests every format with a policy whose name contains characters that every format has to escape.
 #[test]
 fn reports_quote_what_they_are_told() {
     let mut episodes = nine_six_three("a<b>&\"|_,%");
@@ -320,7 +320,7 @@ fn reports_quote_what_they_are_told() {
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
 }
 
-/// A policy that crashes when it is about to lose, and wins the next time, is listed.
+/// A policy that crashes when it is about to fail and then succeeds is listed.
 #[test]
 fn an_episode_that_was_played_again_is_listed() {
     let handover = tasks::find("handover").unwrap();
@@ -330,8 +330,7 @@ fn an_episode_that_was_played_again_is_listed() {
         played
     };
     let mut episodes = nine_six_three("one");
-    // One episode was played again in another folder, one in the same folder, and one as often as the limit
-    // allows.
+    // One episode was played again in another folder, one in the same folder, and one until the retry limit.
     episodes[0].attempts = failed(0, "no plan").into_attempts();
     episodes.push(failed(3, "crash"));
     let attempts = failed(21, "no plan").into_attempts();
@@ -361,7 +360,7 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
         failed("one", 20, EndReason::PolicyFailed, crash),
         failed("one", 21, EndReason::PolicyFailed, crash),
         failed("one", 22, EndReason::SimulatorFailed, "a velocity is not finite"),
-        // It was played again elsewhere.
+        // This episode was played again elsewhere.
         failed("one", 3, EndReason::PolicyFailed, crash),
         failed("other", 20, EndReason::Finished, "it is too hard"),
         PlayedEpisode { keep_failed: true, ..failed("other", 21, EndReason::PolicyFailed, crash) },
@@ -413,7 +412,7 @@ fn results_of_earlier_versions_are_read() {
         None,
         "it is written only where it is set"
     );
-    // In these files, the information for policies is described by disclosure and hints alone, or not at all.
+    // In these files, the information for policies is described only by disclosure and hints, or not at all.
     let spec = old["spec"].as_object_mut().unwrap();
     assert!(spec.remove("assistance").is_some() && spec.remove("hints").is_some());
     spec.insert("disclosure".into(), "end".into());
@@ -462,7 +461,7 @@ fn failures_are_shown_by_turns() {
     );
 }
 
-/// The name of a server is a word; its address is given beside it.
+/// The name of a server is a single word; its address is reported separately.
 #[test]
 fn addresses_are_a_detail() {
     let check = |names: &[&str], titles: &[&str], addresses: &[Option<&str>]| {

@@ -1,4 +1,4 @@
-//! Failure moments of recorded episodes: the moment to look at first, and the address of the page that
+//! Failure moments of recorded episodes: the first moment worth looking at, and the address of the page that
 //! shows it.
 
 use std::path::Path;
@@ -12,29 +12,30 @@ use crate::reports::links::{encoded, relative};
 
 /// Default address of `tandem serve`.
 const SERVED_AT: &str = "http://127.0.0.1:8700";
-/// Falling speed from which an object in no hand counts as dropped; an object that is set down is slower.
+/// Downward speed from which an object that no hand holds counts as dropped; objects are set down more
+/// slowly.
 const DROPPED_M_S: f32 = 0.8;
 
-/// The moment at which an episode went wrong.
+/// The moment at which an episode began to fail.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailureMoment {
     pub policy: String,
     pub task: String,
     pub seed: u32,
-    /// Number of the first phase that counts and was not reached.
+    /// Number of the first counted phase that was not reached.
     pub phase: String,
     /// Description, for example "A fell".
     pub what: String,
-    /// Simulated time.
+    /// Simulated time of the moment.
     pub time_s: f64,
-    /// Address of the page that shows it, on a server whose runs folder has the recording.
+    /// Address of the page that shows the moment, on a server whose runs folder contains the recording.
     pub watch: String,
     /// Link from the report to the episode's own page; `None` if there is none.
     pub page: Option<String>,
 }
 
-/// Returns the moments of at most `most` recorded failures, in turns from every policy and task. Links are
-/// those of a report in `folder`.
+/// Returns the moments of at most `most` recorded failures, taken in turn from each policy and task. Links
+/// are relative to a report in `folder`.
 pub fn failure_moments(loaded: &LoadedEpisodes, most: usize, folder: &Path) -> Vec<FailureMoment> {
     let failures = failed_by_turns(loaded, most, |found| found.recording.is_some());
     failures.into_iter().filter_map(|(policy, found)| moment(&policy, found, folder)).collect()
@@ -62,8 +63,8 @@ fn moment(policy: &str, found: &FoundEpisode, folder: &Path) -> Option<FailureMo
     })
 }
 
-/// Returns the first fall of a robot or drop of an object after the last reached phase, or else the end of
-/// the recording.
+/// Returns the first failure: a fall of a robot, or a drop of an object after the last reached phase. Returns
+/// the end of the recording if there is neither.
 pub(crate) fn moment_of_failure(recording: &Recording) -> Result<(f64, String), RecordingError> {
     let mut watcher = Watcher::default();
     let names: Vec<&str> = recording.spec.task.robots.iter().map(|robot| robot.name).collect();
@@ -74,10 +75,10 @@ pub(crate) fn moment_of_failure(recording: &Recording) -> Result<(f64, String), 
 #[derive(Default)]
 struct Watcher {
     last_s: f64,
-    /// Time at which each object was last held.
+    /// Time at which each object was last held, in seconds.
     held_s: Vec<Option<f64>>,
     fallen: Vec<bool>,
-    /// The first failure since the last phase.
+    /// The first fall, or the first drop since the last reached phase.
     found: Option<(f64, String)>,
 }
 
@@ -110,7 +111,7 @@ impl Watcher {
     }
 }
 
-/// Returns the address of a run's page, slightly before a moment.
+/// Returns the address of a run's page at a time slightly before the moment.
 fn watch_address(run: &str, time_s: f64) -> String {
     format!("{SERVED_AT}/watch?run={}&at={:.1}", encoded(run), (time_s - 1.0).max(0.0))
 }
@@ -122,7 +123,7 @@ mod tests {
     use tandem_sim::Sides;
     use tandem_tools_spec::Protocol;
 
-    /// Time in seconds, whether a phase was reached, and the change of the facts.
+    /// Time in seconds, `true` if a phase was reached, and the change of the facts.
     type WatchedMoment = (f64, bool, fn(Facts) -> Facts);
 
     /// Returns the facts of Handover at its start.
@@ -134,7 +135,7 @@ mod tests {
         task.scores(&motions[0].robot.model, &start).unwrap().facts(&start)
     }
 
-    /// Returns the failure that is found in these moments.
+    /// Returns the failure found in these moments.
     fn found(moments: &[WatchedMoment]) -> Option<(f64, String)> {
         let rest = at_rest();
         let mut watcher = Watcher::default();
@@ -184,7 +185,7 @@ mod tests {
             found(&[&made_good[..], &[(7.0, false, fallen), (8.0, true, fallen)]].concat()),
             some(7.0, "B fell")
         );
-        // An object that no hand held falls for other reasons.
+        // An object that was never held falls for other reasons.
         assert_eq!(found(&[(1.0, false, falls)]), None);
     }
 

@@ -1,5 +1,5 @@
-//! Leaderboard: one table of policies and models from many run folders, together with the benchmark's
-//! published figures. Unknown cells are empty.
+//! Leaderboard: one table of policies and models from many run folders and of the benchmark's published
+//! figures. Unknown cells are empty.
 
 mod published;
 mod rows;
@@ -18,7 +18,7 @@ use crate::statistics::Count;
 /// Rows of policies and models.
 #[derive(Debug, Serialize)]
 pub struct Leaderboard {
-    /// `None` if no command has made it.
+    /// `None` if the leaderboard was not created by a command.
     pub made: Option<ReportOrigin>,
     /// Each policy over all its tasks, then the published methods.
     pub policies: Vec<BoardRow>,
@@ -30,11 +30,11 @@ pub struct Leaderboard {
     pub skipped: Vec<String>,
 }
 
-/// One policy under one protocol, assistance and build, on some tasks.
+/// One policy with one protocol, assistance level and build, on some tasks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoardRow {
     pub policy: String,
-    /// Version and fingerprint of the build that played it, or the publication of the figures.
+    /// Version and fingerprint of the build that played the episodes, or the publication of the figures.
     pub source: String,
     pub protocol: Option<Protocol>,
     /// `None` for published figures.
@@ -46,20 +46,20 @@ pub struct BoardRow {
     pub episodes: usize,
     /// Number of episodes in which the policy itself or the simulator failed; `None` for published figures.
     pub not_counted: Option<usize>,
-    /// Phases that were reached, of all phases of all episodes.
+    /// Number of reached phases among all phases of all episodes.
     pub phases: Count,
-    /// Rate of the episodes that reached the last phase.
+    /// Share of the episodes that reached the last phase.
     pub success: Option<Rate>,
     pub costs: BoardCosts,
     /// Times at which the first and the last episode ended, in UTC.
     pub ended_at: Option<[String; 2]>,
 }
 
-/// Costs of an episode. Each is `None` if it is unknown of all episodes.
+/// Costs per episode. Each is `None` if it is unknown for all episodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BoardCosts {
     pub requests: Option<ValueRange>,
-    /// Text of the recorded replies, in 1,000 bytes.
+    /// Size of the recorded replies' text, in 1,000 bytes.
     pub reply_kilobytes: Option<ValueRange>,
     /// The policy's thinking time in seconds.
     pub thinking: Option<ValueRange>,
@@ -69,7 +69,7 @@ pub struct BoardCosts {
     pub usd: Option<ValueRange>,
 }
 
-/// An episode with its transcript.
+/// An episode with a transcript.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TranscriptLink {
     pub policy: String,
@@ -83,7 +83,7 @@ pub struct TranscriptLink {
     pub reply_bytes: u64,
     pub thinking_s: f64,
     pub ended_at: Option<String>,
-    /// Path of its page, relative to the leaderboard.
+    /// Path of the page, relative to the leaderboard.
     pub link: String,
 }
 
@@ -103,11 +103,11 @@ impl Leaderboard {
         }
     }
 
-    /// Returns the files of the leaderboard, each with its name.
+    /// Returns the files of the leaderboard with their names.
     ///
     /// # Errors
     ///
-    /// If it cannot be written as JSON.
+    /// If the leaderboard cannot be serialized to JSON.
     pub fn files(&self) -> Result<[(&'static str, String); 3], serde_json::Error> {
         Ok([
             ("leaderboard.md", tables::markdown(self)),

@@ -1,5 +1,5 @@
-//! Rows of the benchmark's published figures, from another simulator. They are facts only: all that the
-//! publication does not state is empty.
+//! Rows of the benchmark's published figures, from another simulator. They contain facts only: cells for
+//! which the publication has no value are empty.
 
 use tandem_tools_spec::Protocol;
 
@@ -7,7 +7,8 @@ use super::{BoardCosts, BoardRow};
 use crate::reports::evaluation::{PUBLISHED_IN, PublishedRates, Rate, published_rows};
 use crate::statistics::Count;
 
-/// Number of episodes per task of the benchmark's language models, which play by its protocol for agents.
+/// Number of episodes per task for the benchmark's language models, which use the benchmark's protocol for
+/// agents.
 const EPISODES_OF_AGENTS: usize = 10;
 
 /// Returns a row for each published method over all its tasks.
@@ -16,7 +17,7 @@ pub fn policies() -> Vec<BoardRow> {
     rows.chunk_by(|one, other| one.method == other.method).map(row).collect()
 }
 
-/// Returns the rows by task, each task's followed by the published rows of that task.
+/// Returns the rows by task. Each task's rows are followed by the published rows of the task.
 pub fn beside(played: Vec<BoardRow>) -> Vec<BoardRow> {
     let published = published_rows();
     let mut rows = Vec::new();

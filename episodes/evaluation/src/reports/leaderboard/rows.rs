@@ -1,5 +1,5 @@
-//! Rows of played episodes. Episodes of different protocols, assistance, settings or builds are in different
-//! rows.
+//! Rows of played episodes. Episodes with different protocols, assistance levels, settings or builds are in
+//! different rows.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::reports::links::relative;
 use crate::results::{PLAYERS, PlayedEpisode};
 use crate::statistics::Count;
 
-/// Departures that are columns of their own, or follow from the task.
+/// Departures that have separate columns, or follow from the task.
 const OTHER_COLUMNS: [&str; 3] = ["assistance: ", "suite: ", "task file: "];
 
 /// Rows of the loaded episodes.
@@ -28,12 +28,12 @@ pub struct Rows {
 #[derive(Clone, PartialEq)]
 struct RowKey {
     policy: String,
-    /// Settings of the policy that its name does not express.
+    /// Settings of the policy that its name does not contain.
     policy_settings: Option<serde_json::Value>,
     protocol: Protocol,
     assistance: Assistance,
     settings: Vec<String>,
-    /// Name of the base controller, and files of robot and scene.
+    /// Name of the base controller, identity of the robot's file, and hash of the scene's file.
     world: [String; 3],
     build: String,
 }
@@ -45,7 +45,7 @@ struct BoardEpisode<'a> {
     reply_bytes: Option<u64>,
 }
 
-/// Returns the rows of all whole episodes; links are those of a file in `folder`.
+/// Returns the rows of all whole episodes. Links are relative to a file in `folder`.
 pub fn rows(loaded: &LoadedEpisodes, folder: &Path) -> Rows {
     let mut unreadable = Vec::new();
     let whole = loaded.episodes.iter().filter(|found| found.played.start_phase().is_none());
@@ -86,7 +86,7 @@ pub fn rows(loaded: &LoadedEpisodes, folder: &Path) -> Rows {
     Rows { policies, tasks: by_task, transcripts, unreadable }
 }
 
-/// Sorts rows by protocol and assistance, then by success and phases, the best first.
+/// Sorts rows by protocol and assistance, then by success and phases in descending order.
 fn sort(rows: &mut [BoardRow]) {
     let rules = |row: &BoardRow| {
         (row.protocol.map(Protocol::name), row.assistance.map(Assistance::name), row.settings.clone())
@@ -100,7 +100,8 @@ fn sort(rows: &mut [BoardRow]) {
     });
 }
 
-/// Returns the size of the recorded replies; `None` if no reply left the simulator's process.
+/// Returns the size of the recorded replies in bytes; `None` if no reply was sent outside the simulator's
+/// process.
 fn reply_bytes(recording: &Path) -> Result<Option<u64>, RecordingError> {
     let recording = Recording::read(recording)?;
     let mut bytes = None;
@@ -134,7 +135,7 @@ impl RowKey {
         }
     }
 
-    /// Returns the row of these episodes, which share the key.
+    /// Returns the row of these episodes, which share this key.
     fn row(&self, episodes: &[&BoardEpisode]) -> BoardRow {
         let (counted, excluded): (Vec<&BoardEpisode>, Vec<&BoardEpisode>) =
             episodes.iter().partition(|episode| episode.found.played.counts());
@@ -190,8 +191,8 @@ fn costs(episodes: &[&BoardEpisode]) -> BoardCosts {
 }
 
 impl BoardEpisode<'_> {
-    /// Returns the link to the page of the episode. `None` if there is no page, or if the policy wrote no
-    /// notes.
+    /// Returns the link to the page of the episode. Returns `None` if there is no page, or if the policy
+    /// wrote no notes.
     fn transcript(&self, folder: &Path) -> Option<TranscriptLink> {
         let played = &self.found.played;
         Some(TranscriptLink {

@@ -6,7 +6,7 @@ use super::{BoardRow, Leaderboard, TranscriptLink};
 use crate::reports::evaluation::{Rate, ValueRange, days};
 use crate::reports::table::{self, Table};
 
-/// Columns of the first two tables after the policy, or after task and policy.
+/// Columns of the first two tables that follow the policy, or task and policy.
 const COLUMNS: [&str; 16] = [
     "Played by",
     "Protocol",

@@ -44,12 +44,12 @@ fn what_was_played_by_other_rules_is_another_row() {
         ("benchmark", "paper", 0, 1),
     ];
     assert_eq!(rows, expected);
-    // 3 * 3 + 3 * 2 + 3 phases of 30 were reached.
+    // Of 30 phases, 3 * 3 + 3 * 2 + 3 were reached.
     let phases = own(&board.policies)[1].phases;
     assert_eq!((phases.successes, phases.trials), (18, 30));
 }
 
-/// A task of a suite contributes to its policy's row. By task, it has a row itself.
+/// A task of a suite contributes to its policy's row. In the table by task, it has a row.
 #[test]
 fn tasks_of_one_policy_are_one_row_and_a_row_each() {
     let mut episodes = nine_six_three("agent");
@@ -98,7 +98,7 @@ fn costs_are_medians_and_unknown_ones_empty() {
     let mut failed = played("agent", &tasks::find("handover").unwrap(), 20, 1);
     failed.result.ended = EndReason::PolicyFailed;
     episodes.push(failed.clone());
-    // It was played again, so it is not listed.
+    // This episode was played again, so it is not listed.
     failed.spec.seed = 3;
     episodes.push(failed);
     episodes.push(played("silent", &tasks::find("handover").unwrap(), 0, 0));

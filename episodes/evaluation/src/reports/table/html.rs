@@ -39,14 +39,14 @@ fn cell(table: &Table, tag: &str, column: usize, content: &str) -> String {
     format!("<{tag}{class}>{content}</{tag}>")
 }
 
-/// Returns the number of first cells with the same texts as in the row above, which are not repeated.
+/// Returns the number of leading cells with the same texts as in the row above, which are not repeated.
 fn same_as_above(table: &Table, index: usize) -> usize {
     let above = index.checked_sub(1).map_or(&[][..], |above| &table.rows[above][..table.figures_from]);
     let same = table.rows[index].iter().zip(above).take_while(|(one, other)| one == other).count();
     same.min(table.figures_from.saturating_sub(1))
 }
 
-/// Converts a text to HTML, with code for the parts between backticks.
+/// Converts text to HTML. Parts in backticks become code.
 pub fn marked(text: &str) -> String {
     let part = |(index, part): (usize, &str)| match index % 2 {
         0 => escape(part),

@@ -1,4 +1,4 @@
-//! Tables of reports: rows of texts, which one writer per format draws.
+//! Tables of reports: rows of texts, with one writer for each format.
 
 mod html;
 mod markdown;
@@ -10,16 +10,16 @@ pub use html::{html, marked};
 pub use markdown::markdown;
 pub use tex::tex;
 
-/// A table of texts.
+/// A table with texts as cells.
 pub struct Table {
     pub title: String,
-    /// Explanation of the table. Parts between backticks are code.
+    /// Explanation of the table. Parts in backticks are code.
     pub note: String,
     pub head: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Index of the first column of figures.
+    /// Index of the first column that contains figures.
     pub figures_from: usize,
-    /// Link targets of cells, by row and column. A target is an address or a path relative to the report.
+    /// Link targets of cells, by row and column. A target is a URL or a path relative to the report.
     pub links: BTreeMap<(usize, usize), String>,
 }
 

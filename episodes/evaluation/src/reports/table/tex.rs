@@ -2,11 +2,11 @@
 
 use super::Table;
 
-/// Maximum number of rows on one page; longer tables are broken across pages.
+/// Maximum number of rows on one page; longer tables continue on further pages.
 const MAX_PAGE_ROWS: usize = 40;
-/// Length from which a column's texts are broken into lines, in characters.
+/// Length in characters from which a column's texts are broken into lines.
 const LONG_TEXT_CHARS: usize = 36;
-/// Command that scales the following table down to the width of the text if it is wider.
+/// Command that scales the table that follows to the width of the text if it is wider.
 const WITHIN_THE_PAGE: &str = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}";
 
 /// Renders a table with its title and note as the caption.
@@ -28,7 +28,7 @@ pub fn tex(table: &Table) -> String {
     }
 }
 
-/// Returns the column specifications. Texts that would run out of the page are broken into lines.
+/// Returns the column specifications. Texts that would exceed the page's width are broken into lines.
 fn columns(table: &Table) -> String {
     let is_long = |column: usize| {
         let cells = table.rows.iter().filter_map(|row| row.get(column));
@@ -44,14 +44,14 @@ fn columns(table: &Table) -> String {
     (0..table.head.len()).map(column).collect()
 }
 
-/// Joins the cells of a row. At the beginning of a row, LaTeX would read a bracket or a star as an argument
-/// of the line break before.
+/// Joins the cells of a row. At the beginning of a row, LaTeX would parse a bracket or a star as an argument
+/// of the preceding line break.
 fn row(cells: &[String]) -> String {
     let text = cells.iter().map(|cell| escape_tex(cell)).collect::<Vec<_>>().join(" & ");
     if text.starts_with(['[', '*']) { format!("{{}}{text}") } else { text }
 }
 
-/// Escapes a text, with typewriter letters for the parts between backticks.
+/// Escapes a text for LaTeX. Parts in backticks are set in typewriter type.
 fn marked(text: &str) -> String {
     let part = |(index, part): (usize, &str)| match index % 2 {
         0 => escape_tex(part),
@@ -60,8 +60,8 @@ fn marked(text: &str) -> String {
     text.split('`').enumerate().map(part).collect()
 }
 
-/// Escapes a text for LaTeX. Characters that an engine without Unicode fonts cannot set are written as
-/// their code points.
+/// Escapes a text for LaTeX. Characters that engines without Unicode fonts cannot set are written as code
+/// points.
 pub fn escape_tex(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -83,7 +83,7 @@ pub fn escape_tex(text: &str) -> String {
             '°' => escaped += "$^\\circ$",
             '–' => escaped += "--",
             '’' => escaped.push('\''),
-            // LaTeX would print two hyphens in a row as a dash.
+            // LaTeX would typeset two consecutive hyphens as a dash.
             '-' if escaped.ends_with('-') => escaped += "{}-",
             character if character.is_whitespace() => escaped.push(' '),
             character if character.is_ascii_graphic() || is_accented(character) => escaped.push(character),
@@ -93,7 +93,7 @@ pub fn escape_tex(text: &str) -> String {
     escaped
 }
 
-/// Returns `true` for Latin letters with accents, which LaTeX sets in every encoding of fonts.
+/// Returns `true` for Latin letters with accents, which LaTeX sets in every font encoding.
 fn is_accented(character: char) -> bool {
     ('À'..='ÿ').contains(&character) && !"ÐÞðþ÷".contains(character)
 }
@@ -118,7 +118,7 @@ mod tests {
         assert_eq!(row(&["[x]".into(), "*".into()]), "{}[x] & *");
     }
 
-    /// The beginning and the end of each environment match, whatever the number of rows.
+    /// The begin and end commands of each environment match for any number of rows.
     #[test]
     fn long_tables_are_broken_across_pages() {
         for (rows, expected, absent) in

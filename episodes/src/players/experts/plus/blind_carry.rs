@@ -1,5 +1,5 @@
-//! The BlindCarry expert: both lift the table by its legs. On its way it shifts to the gap, passes it, and
-//! comes back to the marks.
+//! The BlindCarry expert: both robots lift the table by its legs. On the way the table shifts sideways to the
+//! gap, passes through it, and shifts back to the marks.
 
 use std::f32::consts::PI;
 
@@ -12,8 +12,8 @@ use crate::players::experts::skills::{
 use crate::scoring::{A, B};
 
 const LIFT_M: f32 = 0.07;
-/// Height of the pelvises over the floor while the robots take the legs and set them down; `TALL_M` is the
-/// height while they hold the table aloft.
+/// Height of the pelvises above the floor while the robots grasp the legs and set the table down; `TALL_M` is
+/// the height while they hold the table aloft.
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.22;

@@ -23,7 +23,7 @@ const FIRST_MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 const SECOND_MEETING_M: Vector = Vector::new(1.66, -0.06, 0.92);
 /// Place of the bottle before B walks. B's pelvis sinks by up to 12 cm while it walks.
 const ALOFT_M: Vector = Vector::new(0.40, -0.06, 1.06);
-/// Way of B: a step back, two quarter turns, and up to the second counter.
+/// Waypoints of B: a step back, two quarter turns, and up to the second counter.
 const WAY: [(Vector, f32, Tolerance); 3] = [
     (Vector::new(0.98, -0.10, 0.0), PI, ON_THE_WAY),
     (Vector::new(1.02, -0.05, 0.0), -FRAC_PI_2, ON_THE_WAY),

@@ -30,7 +30,7 @@ const OVER_PLACE_M: f32 = 0.10;
 /// Height over its place at which a thing is released.
 const DROP_M: f32 = 0.003;
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// Tolerance on the way back, where the robot already turns.
+/// Tolerance for the waypoint on the way back, at which the robot already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
 
 /// One robot's part: the headings at its sideboard and at the table, and pairs of thing and place in their

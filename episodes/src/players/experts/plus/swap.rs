@@ -1,6 +1,6 @@
-//! The Swap expert: one box goes over the shelf, then the other. The robot that has one puts it there with
-//! the right hand and withdraws the hand. The partner takes it from there with the left hand and puts it on
-//! the pad.
+//! The Swap expert: the boxes go over the shelf one after the other. The holder of a box puts it on the shelf
+//! with its right hand and withdraws the hand. The partner takes it from there with the left hand and puts it
+//! on the pad.
 
 use std::f32::consts::PI;
 

@@ -1,4 +1,4 @@
-//! The WhichOne expert: B fetches the wanted bottle from its shelf and holds it out through the hatch; A
+//! The WhichOne expert: B fetches the wanted bottle from its shelf and holds it out through the hatch. A
 //! takes it by the upper half and puts it on the pad.
 
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -25,7 +25,7 @@ const BACK_M: Vector = Vector::new(0.0, -0.22, 0.0);
 const TURNING_M: Vector = Vector::new(1.02, -0.25, 0.0);
 const AT_HATCH_M: Vector = Vector::new(0.74, -0.12, 0.0);
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// Tolerance on the way back, where B already turns.
+/// Tolerance for the waypoints on the way back, at which B already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.5 };
 /// Place where the bottle changes hands: in the hatch, above its counter.
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);

@@ -1,5 +1,5 @@
 //! Robots that carry one object together, in step: all follow one path of the object, and hands yield to the
-//! partners. One robot that carries or pushes an object with both hands is the smallest team.
+//! partners. A single robot that carries or pushes an object with both hands is the smallest team.
 
 use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
@@ -17,7 +17,7 @@ const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// Compliance of the hands, which two robots need to walk with a load.
 pub const COMPLIANCE_N_S_M: f64 = 250.0;
-/// Time for which robots still correct their places once the object has arrived.
+/// Time for which robots still correct their places once the object has reached its goal.
 const HOLD_S: f32 = 0.4;
 /// Duration of a rest: feet come together, and the tension between the hands fades.
 const REST_S: f32 = 0.6;
@@ -33,7 +33,7 @@ const OVER_M: f32 = 0.015;
 const OVER_RAD: f32 = 0.02;
 const MAX_MOVES_OVER: u32 = 3;
 
-/// Pose of a carried object by the distance that it has gone, and its pace.
+/// Pose of a carried object as a function of the distance travelled, and its pace.
 pub struct ObjectPath<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
@@ -176,8 +176,8 @@ impl<'a> CarryTeam<'a> {
         self.grasps.iter().copied().filter(off).collect::<Vec<_>>().into_iter()
     }
 
-    /// Stops the robots, lets the hands that have lost the object take it where it is now, and brings it
-    /// back to its way.
+    /// Stops the robots, regrasps the object where it is now with the hands that have lost it, and returns it
+    /// to its path.
     fn take_again(&mut self, commander: &mut Commander, on_its_way: &Pose) -> Result<(), PlayerError> {
         self.rest(commander)?;
         let lost: Vec<HandGrasp> = self.hands_off(&commander.facts()?).collect();
@@ -199,7 +199,7 @@ impl<'a> CarryTeam<'a> {
         self.carry_where_free(commander, place, pace_m_s, &FREE)
     }
 
-    /// Takes the object as [`CarryTeam::carry_to`] does, but no farther than the way is free.
+    /// Takes the object to a place like [`CarryTeam::carry_to`], but only as far as the path is free.
     pub fn carry_where_free(
         &mut self,
         commander: &mut Commander,

@@ -13,7 +13,7 @@ const STEPS_PER_COMMAND: u32 = 10;
 /// Control steps of one command of a walking robot. Hands that are fixed in the world fall behind a robot
 /// that does not command them anew often enough.
 pub const WALK_STEPS: u32 = 5;
-/// Control steps of every command while several scripts are played at once.
+/// Control steps of every command while several scripts run at the same time.
 pub const BEAT_STEPS: u32 = WALK_STEPS;
 
 /// Targets of both wrists.
@@ -124,7 +124,7 @@ impl<'a> Commander<'a> {
         self.variety.as_ref().map_or(1.0, Variety::walking)
     }
 
-    /// Creates the commander of one of several scripts that are played at once, with the robots' earlier
+    /// Creates the commander of one of several scripts that run at the same time, with the robots' earlier
     /// targets.
     pub fn in_step(
         task: &'a Task,
@@ -170,8 +170,8 @@ impl<'a> Commander<'a> {
         target.fingers_rad = hand.fingers_rad.or(target.fingers_rad);
     }
 
-    /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named
-    /// hold still.
+    /// Moves hands along straight lines for `duration_s`, from rest to rest. Robots that are not named hold
+    /// still.
     pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let Some(mut variety) = self.variety.take() else {
             return self.travel(duration_s, moves, smooth, Vector::ZERO);
@@ -325,7 +325,7 @@ impl<'a> Commander<'a> {
         }
     }
 
-    /// Makes a call for other commanders.
+    /// Executes a command merged from those of other commanders.
     pub fn pass_on(&mut self, command: MoveWrists) -> Result<ToolReply, PlayerError> {
         self.episode.call(command.into())
     }

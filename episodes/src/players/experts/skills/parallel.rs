@@ -57,8 +57,8 @@ struct ScriptChannel {
     outcomes: Sender<CommandOutcome>,
 }
 
-/// Plays all scripts to their ends. Nothing moves before every script that still plays has sent its next
-/// command. Equal beginnings therefore have equal ends, whichever thread is faster.
+/// Runs all scripts to their ends. Nothing moves before every running script has sent its next command. The
+/// outcome therefore does not depend on the threads' timing.
 pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> Result<(), PlayerError> {
     let facts = commander.facts()?;
     thread::scope(|scope| {
@@ -105,7 +105,7 @@ fn merge_commands(commander: &mut Commander, mut channels: Vec<ScriptChannel>) -
         let reply = commander.pass_on(MoveWrists { steps: BEAT_STEPS, robots })?;
         let facts = commander.facts()?;
         for channel in &channels {
-            // A script that has ended does not play on.
+            // A script that has ended receives no outcome.
             let _ = channel.outcomes.send(CommandOutcome { reply: reply.clone(), facts: facts.clone() });
         }
     }

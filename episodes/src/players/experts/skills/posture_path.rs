@@ -1,4 +1,5 @@
-//! Paths of postures for several robots: each robot's place and its hands, by the distance gone.
+//! Paths of postures for several robots: each robot's place and its hands, as a function of the distance
+//! travelled.
 
 use tandem_sim::{CONTROL_DT_S, Pose, Sides, heading_rad, wrapped_rad};
 
@@ -14,7 +15,7 @@ const CREEP_M_S: f32 = 0.02;
 /// Maximum commanded speed of a robot's base, corrections included.
 const MAX_SPEED_M_S: f32 = 0.35;
 
-/// Place of one robot and its hands, world frame.
+/// Place of one robot on the floor and poses of its hands, in the world frame.
 #[derive(Clone, Copy)]
 pub struct Posture {
     pub robot: usize,
@@ -25,7 +26,7 @@ pub struct Posture {
 /// Free distance of a path without obstacles, which is its whole length.
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
-/// Postures by the distance gone.
+/// Postures as a function of the distance travelled.
 pub struct PosturePath<'a> {
     pub at: &'a dyn Fn(f32) -> Vec<Posture>,
     pub length_m: f32,

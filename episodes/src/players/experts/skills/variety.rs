@@ -47,8 +47,8 @@ impl Variety {
         Some(variety)
     }
 
-    /// Returns the variety of one of several scripts that are played at once. Each has a separate stream, so
-    /// the order of draws between scripts does not matter.
+    /// Returns the variety of one of several scripts that run at the same time. Each has a separate stream,
+    /// so the order of draws between scripts does not matter.
     pub fn of_script(&self, script: usize) -> Variety {
         let mut own = self.clone();
         own.random ^= (script as u64 + 1) << 40;

@@ -53,7 +53,8 @@ pub struct TargetVelocity {
     pub turning_rad_s: f32,
 }
 
-/// Returns the base velocity with which a robot whose pelvis is at `at` reaches a place and stays there.
+/// Returns the base velocity with which a robot whose pelvis is at `at` reaches the place `to` and stays
+/// there.
 pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> BaseVelocity {
     let mut off_m = to.translation - at.translation;
     off_m.z = 0.0;
@@ -68,7 +69,7 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
 }
 
 /// Brings robots near their places, without waiting for them to come to rest. Their hands keep their poses
-/// relative to the body. A robot that has arrived stops while the others still walk.
+/// relative to the body. A robot at its place stops while the others still walk.
 pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
@@ -100,10 +101,10 @@ pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), Play
     arrive(commander, goals, 0.0..=LONGEST_S, &|_| hands.clone())
 }
 
-/// Brings robots to their places while their hands reach out. Each pair in `reaches` belongs to the robot
-/// of the goal with the same index. A robot that already stands when its arms go out takes a step
-/// afterwards, because the arms shift its weight forward. One that walks meanwhile stops at its place with
-/// its arms out.
+/// Brings robots to their places while their hands reach out. Each pair in `reaches` belongs to the robot of
+/// the goal with the same index. A robot that already stands when its arms go out takes a step afterwards,
+/// because the arms shift its weight forward. A robot that walks meanwhile stops at its place with its arms
+/// out.
 pub fn walk_reaching(
     commander: &mut Commander,
     goals: &[WalkGoal],
@@ -131,7 +132,7 @@ pub fn walk_reaching(
 }
 
 /// Walks robots to their places; `hands` gives the wrist targets by the time since the start. Each robot
-/// stops once it has arrived, but not before the start of `time_s`.
+/// stops at its place, but not before the start of `time_s`.
 fn arrive(
     commander: &mut Commander,
     goals: &[WalkGoal],

@@ -1,12 +1,12 @@
-//! The way of an object that several robots carry, measured by the robot that has farthest to walk. When
-//! the object turns, robots at its ends walk farther than its middle moves.
+//! Path of an object that several robots carry. Its length is measured by the robot that has farthest to
+//! walk. When the object turns, robots at its ends walk farther than its middle moves.
 
 use tandem_sim::Pose;
 
 /// Number of pieces in which a stretch between two stops is measured.
 const PIECES: usize = 16;
 
-/// A way that is straight from stop to stop, with an even turn along each stretch.
+/// A path that is straight from stop to stop, with a uniform turn along each stretch.
 pub struct WalkedWay {
     stretches: Vec<Stretch>,
 }
@@ -24,7 +24,7 @@ impl Stretch {
 }
 
 impl WalkedWay {
-    /// Creates the way through `stops` of the object, world frame. The robots stand at `object_from_stand`,
+    /// Creates the path through `stops` of the object, world frame. The robots stand at `object_from_stand`,
     /// in the object's frame.
     pub fn new(stops: &[Pose], object_from_stand: &[Pose]) -> WalkedWay {
         let stretch = |ends: &[Pose]| {

@@ -8,11 +8,11 @@ use crate::body::layout::joint_names;
 use crate::mjcf::{BodyLink, BodyTree, LinkJoint, pose};
 use crate::{Side, Sides};
 
-/// Lateral part of an axis from which a joint bends a leg.
+/// Minimum lateral component of the axis of a joint that bends a leg.
 const MIN_LATERAL: f32 = 0.7;
-/// Distance from the middle at which a limb is on a side.
+/// Minimum distance from the middle at which a limb belongs to a side.
 const MIN_ASIDE_M: f32 = 0.01;
-/// Distance from the middle up to which a link is a head.
+/// Maximum distance of a head from the middle.
 const MAX_HEAD_ASIDE_M: f32 = 0.05;
 /// Maximum number of joints of an arm.
 const MAX_ARM: usize = 7;
@@ -25,7 +25,7 @@ pub(super) struct Limbs<'a> {
     root_from_link: Vec<Pose>,
     /// Links by the published names of the joints that carry them.
     pub joints: BTreeMap<String, usize>,
-    /// Links of each arm from the shoulder on; empty without one.
+    /// Links of each arm, from the shoulder; empty without an arm.
     pub arms: Sides<Vec<usize>>,
     /// Link that carries the arms.
     pub trunk: usize,
@@ -51,7 +51,7 @@ impl Turn {
         }
     }
 
-    /// Returns parts of names of such joints, each with its weight against an axis.
+    /// Returns parts of the names of joints with this rotation, each with its weight against an axis.
     fn hints(self) -> &'static [(&'static str, f32)] {
         match self {
             Turn::Pitch => &[("pitch", 2.0)],
@@ -119,7 +119,7 @@ impl<'a> Limbs<'a> {
         self.tree.links[link].joint.name().unwrap_or_default().to_lowercase()
     }
 
-    /// Returns the links from the root, without it, to a link.
+    /// Returns the links from the root to a link, without the root.
     fn path(&self, link: usize) -> Vec<usize> {
         let above = std::iter::successors(Some(link), |link| self.tree.links[*link].parent);
         let mut path: Vec<usize> = above.filter(|link| *link != 0).collect();
@@ -135,8 +135,8 @@ impl<'a> Limbs<'a> {
         (1..self.tree.links.len()).filter(|link| self.children(*link) == 0)
     }
 
-    /// Returns the paths to the leaf on each side for which `size` is largest, and the part that is common to
-    /// both; `None` if a side has none.
+    /// Returns the paths to the leaf on each side with the largest `size`, and their common part. Returns
+    /// `None` if a side has no leaf.
     fn pair(
         &self,
         leaves: &[usize],
@@ -153,7 +153,7 @@ impl<'a> Limbs<'a> {
         Some((paths.map(|path| path[common..].to_vec()), shared))
     }
 
-    /// Names the joints of the legs: those of the lowest leaves. Returns all links of both.
+    /// Names the joints of the legs, whose feet are the lowest leaves. Returns all links of both legs.
     fn find_legs(&mut self) -> Vec<usize> {
         let leaves: Vec<usize> = self.leaves().collect();
         let Some((legs, _)) = self.pair(&leaves, |_, end_m| -end_m.z) else {
@@ -185,7 +185,7 @@ impl<'a> Limbs<'a> {
         legs.left.into_iter().chain(legs.right).collect()
     }
 
-    /// Names the joints of the waist and the arms: those of the outermost leaves besides the legs'.
+    /// Names the joints of the waist and the arms, whose hands are the outermost leaves except for the feet.
     fn find_arms(&mut self, legs: &[usize]) {
         let leaves: Vec<usize> = self.leaves().filter(|leaf| !legs.contains(leaf)).collect();
         let is_middle = |leaf: &usize| self.origin_m(*leaf).y.abs() < MAX_HEAD_ASIDE_M;
@@ -208,7 +208,7 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the links of an arm up to the hand: where it branches, or begins to have names of fingers.
+    /// Returns the links of an arm up to the hand: where the arm branches, or names of fingers begin.
     fn without_fingers(&self, arm: Vec<usize>) -> Vec<usize> {
         let is_finger = |link: &usize| FINGERS.iter().any(|finger| self.name(*link).contains(finger));
         let branch = arm.iter().position(|link| self.children(*link) > 1).map_or(arm.len(), |at| at + 1);
@@ -239,7 +239,7 @@ impl<'a> Limbs<'a> {
         self.give_name(format!("{}_{part}_joint", side.name()), link);
     }
 
-    /// Gives a joint a published name, unless it or another joint has one by itself.
+    /// Gives a joint a published name, unless it already has one or another joint has this name.
     fn give_name(&mut self, name: String, link: usize) {
         if !self.joints.values().any(|taken| *taken == link) {
             self.joints.entry(name).or_insert(link);

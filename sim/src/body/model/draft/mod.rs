@@ -1,5 +1,5 @@
-//! Drafts of descriptions of third-party MJCF: which joint is which, and where hands and camera are, guessed
-//! from the tree, from the axes of its joints and from their names.
+//! Drafts of descriptions of third-party MJCF. The assignment of joints, and the frames of hands and camera,
+//! are guessed from the tree, and from the axes and names of its joints.
 
 mod limbs;
 
@@ -24,11 +24,11 @@ pub struct RobotDraft {
     pub notes: Vec<String>,
 }
 
-/// Minimum cosine at which a hand counts as along an axis of the root.
+/// Minimum cosine between a hand's direction and an axis of the root at which they count as parallel.
 const ALONG_COSINE: f32 = 0.9;
-/// Minimum length of a forearm that shows the direction of the hand.
+/// Minimum length of a forearm that determines the direction of the hand.
 const MIN_FOREARM_M: f32 = 0.05;
-/// Minimum vertical part of a hanging hand's direction.
+/// Minimum vertical component of a hanging hand's direction.
 const MIN_UPRIGHT: f32 = 0.7;
 /// Height of the camera below the top of a trunk, and of a head as a share of its height.
 const BELOW_TOP_M: f32 = 0.06;
@@ -63,7 +63,7 @@ impl RobotDraft {
     }
 }
 
-/// Writes the tables of joints that move and of those that are held.
+/// Writes the tables of joints that move and of joints that are held.
 fn draft_joints(text: &mut String, limbs: &Limbs) {
     let own = |name: &String| limbs.link(*limbs.joints.get(name)?).joint.name();
     let names = joint_names().into_iter().filter_map(|name| Some((own(&name)?, name)));
@@ -145,14 +145,14 @@ fn bounds_m(limbs: &Limbs, link: usize) -> Option<[Vector; 2]> {
     bounds.reduce(|[low, high], [lower, higher]| [low.min(lower), high.max(higher)])
 }
 
-/// Returns the nearest axis of the root if a direction is almost along it.
+/// Returns the nearest axis of the root if the direction is almost parallel to it.
 fn snapped(direction: Vector) -> Vector {
     let axes = [Vector::X, Vector::Y, Vector::Z].into_iter().flat_map(|axis| [axis, -axis]);
     axes.into_iter().find(|axis| axis.dot(direction) > ALONG_COSINE).unwrap_or(direction)
 }
 
 fn numbers(values: &[f32]) -> String {
-    // Zeros have no sign.
+    // Zeros are written without a sign.
     let rounded = values.iter().map(|value| format!("{}", (f64::from(*value) * 1e4).round() / 1e4 + 0.0));
     format!("[{}]", rounded.collect::<Vec<_>>().join(", "))
 }

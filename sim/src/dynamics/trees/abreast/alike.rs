@@ -1,4 +1,4 @@
-//! Trees of one layout: their mass matrices are factorised side by side, and their velocities whitened.
+//! Trees of one layout, whose mass matrices are factorised and whose velocities are whitened side by side.
 
 use std::array::from_fn;
 
@@ -7,9 +7,9 @@ use crate::dynamics::trees::Trees;
 use crate::dynamics::trees::layout::Layout;
 use crate::dynamics::trees::tree::Tree;
 
-/// Trees of one layout, at most as many as there are lanes.
+/// Trees of one layout, at most one per lane.
 pub struct Alike {
-    /// Indices of the trees among all.
+    /// Indices of these trees among all trees.
     pub trees: Vec<usize>,
     /// The factors as in `factor`: L, whose packed rows are first those of M, and D^-1/2.
     l: Vec<Abreast>,
@@ -29,8 +29,8 @@ impl Alike {
         &trees.all[self.trees[0]].layout
     }
 
-    /// Fills the lanes with the numbers of the trees. Lanes without a tree get those of the first tree,
-    /// which keeps their values ordinary.
+    /// Fills the lanes with the numbers of the trees. Lanes without a tree repeat those of the first tree, so
+    /// that their values stay finite.
     #[inline(always)]
     fn gather<'a>(&self, of: impl Fn(usize) -> &'a [f64], lanes: &mut Vec<Abreast>) {
         let first = of(self.trees[0]);
@@ -46,13 +46,13 @@ impl Alike {
         to.iter_mut().zip(lanes).for_each(|(to, from)| *to = from.0[lane]);
     }
 
-    /// Gathers the trees' velocities from those of all trees.
+    /// Loads the velocities of these trees from those of all trees.
     #[inline(always)]
     pub fn load(&self, trees: &Trees, w: &[f64], lanes: &mut Vec<Abreast>) {
         self.gather(|tree| &w[trees.offset[tree]..][..trees.all[tree].dofs()], lanes);
     }
 
-    /// Writes the trees' velocities back.
+    /// Stores the velocities of these trees among those of all trees.
     #[inline(always)]
     pub fn store(&self, offset: &[usize], lanes: &[Abreast], w: &mut [f64]) {
         for (lane, tree) in self.trees.iter().enumerate() {
@@ -60,8 +60,8 @@ impl Alike {
         }
     }
 
-    /// Factorises the mass matrices of the trees, and sets `w` to their whitened velocities at the end
-    /// of an unconstrained step. It does lane by lane what `factor` does for one tree.
+    /// Factorises the mass matrices of the trees, and sets `w` to the whitened velocities at the end of an
+    /// unconstrained step. In each lane it computes the same as `factor` for one tree.
     #[inline(always)]
     pub fn whiten(&mut self, all: &mut [Tree], offset: &[usize], dt_s: f64, w: &mut [f64]) {
         let [mut l, mut v, mut rhs] = [&mut self.l, &mut self.v, &mut self.rhs].map(std::mem::take);
@@ -116,7 +116,7 @@ impl Alike {
                 lv += *l * self.v[j];
             }
             let inverse_root_d = self.inverse_root_d[k];
-            // This velocity is not needed again: only degrees of freedom further out have it on their paths.
+            // This velocity is not needed again: only the paths of degrees of freedom further out contain it.
             self.v[k] = lv.with(inverse_root_d, |lv, inverse_root_d| lv / inverse_root_d)
                 + force * dt_s * inverse_root_d;
         }
@@ -141,8 +141,8 @@ impl Alike {
         self.v = lanes;
     }
 
-    /// Appends Y = D^-1/2 L^-T e_k, the whitened row of degree of freedom `k` alone, on its path.
-    /// Returns Y . Y.
+    /// Appends Y = D^-1/2 L^-T e_k, the whitened unit row of degree of freedom `k`, on its path. Returns Y .
+    /// Y.
     #[inline(always)]
     pub fn push_unit_row(&self, layout: &Layout, k: usize, all: &mut Vec<Abreast>) -> Abreast {
         let path = layout.path(k);

@@ -1,6 +1,5 @@
-//! Trees of one layout side by side, for example robots of one model. Each has a lane of a vector, and
-//! every operation acts on all lanes. Lanes are independent, and add and multiply exactly as scalars do,
-//! bit for bit.
+//! Trees of one layout side by side, for example robots of one model. Each tree has one lane of a vector, and
+//! every operation acts on all lanes. Lanes are independent. Results are bit-identical to scalar operations.
 
 mod alike;
 
@@ -13,12 +12,12 @@ pub const ABREAST: usize = 4;
 /// Number of independent partial sums, each over every fourth column, as in `rows`.
 const SIDE: usize = 4;
 
-/// One number of each tree.
+/// One number for each tree.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 pub struct Abreast(pub [f64; ABREAST]);
 
-/// Rows of one degree of freedom side by side: their non-zero columns, and the entries of Y there.
+/// Rows of one degree of freedom for several trees: the non-zero columns, and the entries of Y in them.
 pub struct AbreastRow<'a> {
     pub column: &'a [u16],
     pub y: &'a [Abreast],
@@ -33,8 +32,8 @@ impl Abreast {
         Abreast(from_fn(|lane| of(self.0[lane], other.0[lane])))
     }
 
-    /// Returns a mask that stays in a vector: in each lane all bits are set if the condition holds, and
-    /// otherwise no bit.
+    /// Returns a mask that can stay in a vector register. In each lane, all bits are set if the condition
+    /// holds, and otherwise none.
     #[inline(always)]
     pub fn mask(self, other: Abreast, is: impl Fn(f64, f64) -> bool) -> Abreast {
         self.with(other, |a, b| f64::from_bits(if is(a, b) { u64::MAX } else { 0 }))
@@ -50,7 +49,7 @@ impl Abreast {
         self.with(other, |a, b| f64::from_bits(a.to_bits() | b.to_bits()))
     }
 
-    /// Returns true if a bit of one of the numbers is set.
+    /// Returns true if any bit of any number is set.
     #[inline(always)]
     pub fn any(self) -> bool {
         self.0.iter().fold(0, |bits, number| bits | number.to_bits()) != 0
@@ -115,8 +114,8 @@ impl AbreastRow<'_> {
         sums[0] + sums[1] + sums[2] + sums[3]
     }
 
-    /// Adds impulses in the lanes of the mask. Velocities of other lanes are unchanged, including the
-    /// sign of a zero.
+    /// Adds impulses in the lanes of the mask. Velocities in other lanes are unchanged, including the sign of
+    /// a zero.
     #[inline(always)]
     pub fn push_impulse(&self, impulse: Abreast, acts: Abreast, w: &mut [Abreast]) {
         let impulse = impulse.and(acts);

@@ -1,13 +1,13 @@
 //! Leaning ahead of pulls: a standing robot leans against the predicted size of a growing pull before it
 //! is reached.
 //!
-//! A pull from the world does not depend on the robot's motion. A held object may react to the lean: of
-//! two robots that hold one load, each feels the other's lean as a growing pull. If both lean away by x,
-//! a load of the stiffness k between them pulls with 2 k x at the height z. Against that both lean by
-//! 2 k x z / (m g),  which is more than x from k = 200 N/m on; a lead increases that gain further. If a
-//! hand meets an obstacle by its own motion, such as a counter or the wall of a bin, the obstacle pushes
-//! back: the robot would lean into it and the hand slide away. So a robot leans ahead only with hands
-//! that are still, empty and free of contact.
+//! A pull from the world does not depend on the robot's motion. A held object may react to the lean: if two
+//! robots hold one load, each senses its partner's lean as a growing pull. If both lean away by x, a load of
+//! the stiffness k between them pulls with 2 k x at the height z. Against that both lean by 2 k x z / (m g),
+//! which is more than x from k = 200 N/m on; a lead increases that gain further. If a hand's own motion
+//! brings it against an obstacle, such as a counter or the wall of a bin, the obstacle pushes back: the robot
+//! would lean into it, and the hand would slide away. Therefore a robot leans ahead only with hands that are
+//! still, empty and free of contact.
 
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,8 @@ impl Ahead {
         self.share
     }
 
-    /// Returns true if the hands are still, empty and free of contact, and the robot is not to bend down.
+    /// Returns true if the hands are still, empty and free of contact, and the robot is not commanded to bend
+    /// down.
     pub(in crate::locomotion::balance) fn is_free(&self) -> bool {
         self.free
     }

@@ -1,19 +1,20 @@
 //! Separation of a partner's pull through a shared load from forces of the world.
 //!
-//! Robots that hold one load are joined by a spring: arms and a table have some 1000 N/m. Each comes to rest
-//! over its feet to a centimetre or two, which is 20 to 30 N between them, and the observer takes that for a
-//! push. A robot may feed this force forward, lean against it and count it as a loss of stance. It then holds
-//! its own place to the millimetre, and so does its partner: two integrators at the ends of one spring. 27 N
-//! at the hands move the balance point by 7 cm. So robots at rest stepped out of a stance that nothing
-//! threatened, pulled each other while they stepped, and came to rest elsewhere, without end. Two robots that
-//! step and lean against each other with all of the force are even in equilibrium at any force.
+//! Robots that hold one load are coupled by a spring: arms and a table have about 1000 N/m. Each robot comes
+//! to rest over its feet within a centimetre or two. This causes a force of 20 to 30 N between them, which
+//! the observer takes for a push. A robot may feed this force forward, lean against it and count it as a loss
+//! of stance. It then holds its own place to the millimetre, and so does its partner: two integrators at the
+//! ends of one spring. 27 N at the hands move the balance point by 7 cm. Therefore robots at rest stepped out
+//! of a safe stance, pulled each other while they stepped, and came to rest elsewhere, without end. Two
+//! robots that step and lean against each other with all of the force are even in equilibrium at any force.
 //!
-//! So a robot whose fingers press on something attributes the part of the push that its hands feel to a
-//! partner. It resists that part with the stiffness of its pelvis alone, and steps as if it were absent,
-//! which lets the force decay. The part that hands do not feel, for example a shove at the chest, is
-//! withstood as before, except for the share that friction and moving arms leave unexplained. A pull on
-//! the hands beyond what feet can hold is the world's, and is withstood, too. It is not required that
-//! both fingers and thumb press: hands that hook round a table's leg press with one of them.
+//! Therefore a robot whose fingers press on an object attributes the part of the push that its hands sense to
+//! a partner. It resists that part with the stiffness of its pelvis alone, and steps as if that part were
+//! absent, which lets the force decay. The part that the hands do not sense, for example a shove at the
+//! chest, is withstood as before, except for the share that friction and moving arms leave unexplained. A
+//! pull on the hands beyond what the feet can hold is attributed to the world, and is withstood, too. It is
+//! sufficient that either fingers or thumb press: hands that hook round a table's leg press with only one of
+//! the two.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -25,15 +26,15 @@ use crate::plane::flat;
 const BEGINS_1_S: f32 = 2.0;
 /// Rate at which a hold ends: fingers that slip on an edge press again within a moment.
 const ENDS_1_S: f32 = 1.0;
-/// Minimum pull on the hands (38 N on a G1) that counts as the world's. It has to last for `STRONG_S`, and
-/// counts until it falls below the share `STILL_STRONG` of the minimum.
+/// Minimum pull on the hands (38 N on a G1) that is attributed to the world. The pull has to last for
+/// `STRONG_S`. It is attributed to the world until it falls below the share `STILL_STRONG` of the minimum.
 const STRONG_M_S2: f32 = 1.1;
 const STRONG_S: f32 = 0.1;
 const STILL_STRONG: f32 = 0.5;
 const WITHSTANDS_1_S: f32 = 5.0;
 const GIVES_WAY_1_S: f32 = 1.0;
-/// Factor and offset on the felt force: the estimate for a stretched arm is a quarter too small, and
-/// slower than the observer.
+/// Factor and offset on the sensed force: the estimate for a stretched arm is a quarter too small, and slower
+/// than the observer.
 const EXPLAINED_SHARE: f32 = 1.3;
 const EXPLAINED_M_S2: f32 = 0.2;
 /// Minimum unexplained push that counts as an error of the estimate while the hands hold an object: 17 N on a
@@ -48,7 +49,7 @@ pub(in crate::locomotion::balance) struct Partner {
     /// Time for which the pull has been strong.
     strong_s: f32,
     strong: bool,
-    /// Degree to which the pull is the world's, 0 to 1.
+    /// Degree to which the pull is attributed to the world, 0 to 1.
     world_share: f32,
 }
 
@@ -88,8 +89,8 @@ impl Partner {
     }
 }
 
-/// Returns the part of a push that comes through the hands. It has the direction of the felt force and is not
-/// much larger.
+/// Returns the part of a push that comes through the hands. It has the direction of the sensed force and is
+/// not much larger.
 fn explained_m_s2(push_m_s2: Vector, felt_m_s2: Vector) -> Vector {
     let along = felt_m_s2.normalize_or_zero();
     let most_m_s2 = felt_m_s2.length() * EXPLAINED_SHARE + EXPLAINED_M_S2;
@@ -104,7 +105,7 @@ mod tests {
 
     const DT_S: f32 = 1.0 / 200.0;
 
-    /// Splits a push ahead that lasts for some seconds. The hands feel the part `felt_m_s2`.
+    /// Splits a forward push that lasts for some seconds. The hands sense the part `felt_m_s2`.
     fn split(
         partner: &mut Partner,
         presses: bool,

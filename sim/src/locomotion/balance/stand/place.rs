@@ -18,24 +18,25 @@ const RETURN_M_S: f32 = 0.15;
 
 /// Time for which a stopping robot coasts at its present speed.
 const COASTS_S: f32 = 0.2;
-/// Maximum duration of a short move. After one, the robot steps on until its feet are near its commanded
-/// place, or for a while. In a longer walk the caller corrects the commands by observation, so the robot
-/// stops as soon as it can.
+/// Maximum duration of a short move. After a short move, the robot continues to step until its feet are near
+/// its commanded place, or for a limited time. In a longer walk the caller corrects the commands by
+/// observation, so the robot stops as soon as it can.
 const MOVED_SHORT_S: f32 = 2.5;
-/// Time in which a longer walk forgets the robot's lag or lead on its command; beyond the leash it is
-/// forgotten at once.
+/// Time in which a longer walk discards the robot's lag or lead on its command. An error beyond the leash is
+/// discarded at once.
 const FORGETS_S: f32 = 4.0;
 const MOVED_LEASH_M: f32 = 0.25;
 const MOVED_NEAR_M: f32 = 0.012;
 const MOVED_LONGEST_S: f32 = 0.4;
 const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
-/// Maximum shift of the pelvis that compensates the position error of the feet after such a stop.
+/// Maximum shift of the pelvis that compensates the position error of the feet after a commanded move.
 const MOVED_SHIFT_M: f32 = 0.04;
-/// This maximum for a robot that holds an object with partners.
+/// The same maximum for a robot that holds an object with partners.
 const HELD_SHIFT_M: f32 = 0.02;
 
-/// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.
+/// Middle of the soles and heading of a standing robot, or of a robot that stops at the place to which
+/// commands have moved it.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct StandingPlace {
     pub middle_m: Vector,
@@ -46,13 +47,13 @@ pub(in crate::locomotion::balance) struct StandingPlace {
 /// State of a place that commands move.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MovedPlace {
-    /// Pelvis over the centre of mass of the robot, loads included, once it stands with its present arm
-    /// posture; heading frame.
+    /// Pelvis relative to the robot's centre of mass, loads included, once the robot stands with its present
+    /// arm posture; heading frame.
     rest_m: Vector,
     /// Contribution of the legs to the offset from the pelvis to the centre of mass in the last stance,
     /// heading frame.
     standing_legs_m: Vector,
-    /// Time for which commands have moved it, and time since they ended.
+    /// Time for which commands have moved the place, and time since they ended.
     told_s: f32,
     ended_s: f32,
 }
@@ -63,7 +64,7 @@ impl StandingPlace {
         StandingPlace { middle_m, heading_rad, moved: None }
     }
 
-    /// Creates the place from which commands take a robot. Its feet come under the present centre of
+    /// Creates the place of a robot that commands begin to move. Its feet will be under the present centre of
     /// mass, so that the pelvis need not move.
     pub(in crate::locomotion::balance) fn of_mover(
         body: &BodyEstimate,
@@ -92,7 +93,7 @@ impl StandingPlace {
         moved.rest_m = rest_m;
     }
 
-    /// Returns true if commands took the robot here.
+    /// Returns true if commands have moved the robot to this place.
     pub(in crate::locomotion::balance) fn is_moved(&self) -> bool {
         self.moved.is_some()
     }

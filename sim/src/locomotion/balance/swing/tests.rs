@@ -13,7 +13,8 @@ fn ahead(x_m: f32) -> Pose {
     Pose::from_translation(Vector::new(x_m, 0.05, 0.0))
 }
 
-/// Flies a path to a goal that may change on the way. Returns position and velocity after each physics step.
+/// Follows a path to a goal that may change on the way. Returns position and velocity after each physics
+/// step.
 fn fly(goal: impl Fn(f32) -> Pose, pace: f32) -> (Swing, Vec<(Vector, Vector)>) {
     let mut swing = Swing::at(START);
     let mut path = Vec::new();
@@ -74,7 +75,8 @@ fn the_foot_is_lifted_and_set_down_smoothly() {
     );
 }
 
-/// The path reaches the goals that `reachable_m` returns, and a foot without a force stops where predicted.
+/// Goals within reach are kept. Farther goals are moved to the limit of the reach, which is centred on the
+/// end of the path that starts without jerk.
 #[test]
 fn far_goals_are_brought_within_reach() {
     let mut swing = Swing::at(START);

@@ -10,7 +10,7 @@ const MAX_SIDE: u32 = 1024;
 /// Maximum width and height of a sky without marks.
 const MAX_PLAIN_SKY_SIDE: u32 = 128;
 const DEFAULT_RGB_1: [f64; 3] = [0.8; 3];
-/// Share of the texels that `mark="random"` paints if a file does not give it.
+/// Share of the texels that `mark="random"` paints if a file gives no share.
 const DEFAULT_RANDOM_SHARE: f64 = 0.01;
 
 /// A builtin texture as a file states it.
@@ -38,8 +38,8 @@ enum Mark {
     Random,
 }
 
-/// Returns the image of an element `<texture builtin=...>`, or the six of a cube in the order +x, -x, +y, -y,
-/// +z, -z. Returns none for other textures.
+/// Returns the image of an element `<texture builtin=...>`, or the six images of a cube in the order +x, -x,
+/// +y, -y, +z, -z. Returns an empty vector for other textures.
 pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
     let kind = match texture.attribute("builtin") {
         Some("flat") => Kind::Flat,
@@ -142,7 +142,7 @@ impl Builtin {
         bytes(std::array::from_fn(|i| share * second[i] + (1.0 - share) * first[i]))
     }
 
-    /// Returns the colour of the marks where one covers a texel.
+    /// Returns the colour of the marks if one covers this texel.
     fn marked(&self, [column, row]: [u32; 2], [width, height]: [u32; 2]) -> Option<Rgb<u8>> {
         let is_marked = match self.mark {
             Mark::None => false,
@@ -159,7 +159,7 @@ fn across(pixel: u32, pixels: u32) -> f64 {
     2.0 * f64::from(pixel) / f64::from(pixels.saturating_sub(1).max(1)) - 1.0
 }
 
-/// Returns a number from 0 to 1 that looks random. The marked texels therefore differ from MuJoCo's.
+/// Returns a pseudo-random number from 0 to 1. The marked texels therefore differ from MuJoCo's.
 fn scattered(number: u32) -> f64 {
     let mixed = u64::from(number).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);

@@ -7,10 +7,10 @@ use ktx2::{Format, MAGIC, Reader, SupercompressionScheme};
 
 use crate::mjcf::assets::files::MAX_FILE_BYTES;
 
-/// Advice on files of other kinds.
+/// Advice in errors about files of other kinds.
 const ADVICE: &str = "R8G8B8A8_SRGB, plain or with Zstandard, would be read";
 
-/// Key of the directions of columns and rows, and its value for rows from the bottom.
+/// Key of the directions of columns and rows, and its value for rows from bottom to top.
 const ORIENTATION: &str = "KTXorientation";
 const UPWARDS: &[u8] = b"ru";
 
@@ -33,7 +33,7 @@ enum Channels {
 }
 
 impl KtxImages {
-    /// Decodes a file's largest images; `None` if it is no KTX2 file.
+    /// Decodes the largest images of a file. Returns `None` if it is not a KTX2 file.
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ impl KtxImages {
     }
 }
 
-/// Returns the channels of a format, and true if values are sRGB; `None` for formats that are not read.
+/// Returns the channels of a format, and true if its values are sRGB. Returns `None` for unsupported formats.
 fn channels(format: Option<Format>) -> Option<(Channels, bool)> {
     match format? {
         Format::R8_UNORM => Some((Channels::Red, false)),

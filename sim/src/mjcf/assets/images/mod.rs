@@ -1,4 +1,5 @@
-//! Images of textures: files, a file or a part of one for each face of a cube, and MuJoCo's builtin ones.
+//! Images of textures: from a file, from a file or a part of one for each face of a cube, or MuJoCo's builtin
+//! ones.
 
 mod builtin;
 mod ktx;
@@ -49,7 +50,7 @@ impl Document {
             if node.attribute("type") == Some("skybox") {
                 sky.get_or_insert(found.clone());
             }
-            // A builtin sky is no texture of a material.
+            // A builtin sky is not the texture of a material.
             match (drawn.is_empty(), node.attribute("type")) {
                 (true, _) => textures.push((name, found)),
                 (false, Some("skybox")) => {}
@@ -64,7 +65,8 @@ impl Document {
         Ok(())
     }
 
-    /// Returns the image of a texture's file, or six for the faces of a cube; none if it names no file.
+    /// Returns the image of a texture's file, or six images for the faces of a cube. Returns none if the
+    /// texture names no file.
     fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<DynamicImage>, SimError> {
         let mut images = |file: &str| self.images_of_file(node, file, read);
         if let Some(file) = node.attribute("file") {
@@ -82,7 +84,7 @@ impl Document {
         FACES.iter().map(face).collect()
     }
 
-    /// Returns the images of a file: at least one.
+    /// Returns the images in a file, at least one.
     fn images_of_file(
         &self,
         node: &Node,
@@ -100,7 +102,8 @@ impl Document {
             _ => says_srgb,
         };
         read.push((path, xxh3_64(&bytes)));
-        // MuJoCo converts such an image to linear light, and draws that as if it were values of a file.
+        // MuJoCo converts such an image to linear light, and then draws the result as if it were the file's
+        // values.
         Ok(match is_srgb && self.lights.is_some() {
             true => images.into_iter().map(decoded).collect(),
             false => images,
@@ -108,7 +111,8 @@ impl Document {
     }
 }
 
-/// Decodes an image file: one image, or six of a cube in a KTX2 file. Returns true, too, if the file says that
+/// Decodes an image file: one image, or six for a cube in a KTX2 file. Also returns true if the file declares
+/// its values to be sRGB.
 /// values are sRGB.
 ///
 /// # Errors
@@ -124,10 +128,10 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<(Vec<DynamicImage>, bool), SimErr
     Ok((vec![decoded.map_err(|source| refuse(source.into()))?], states_srgb(bytes)))
 }
 
-/// Returns true if a PNG file says that its values are sRGB.
+/// Returns true if a PNG file declares its values to be sRGB.
 fn states_srgb(bytes: &[u8]) -> bool {
     const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
-    /// Bytes of a chunk besides its content: its length, its name and its checksum.
+    /// Bytes of a chunk besides its content: length, name and checksum.
     const AROUND_BYTES: usize = 12;
     let Some(mut rest) = bytes.strip_prefix(SIGNATURE) else { return false };
     while let Some((length, after)) = rest.split_first_chunk::<4>() {
@@ -142,7 +146,7 @@ fn states_srgb(bytes: &[u8]) -> bool {
     false
 }
 
-/// Returns an image whose values are the linear light of those of another.
+/// Returns an image with the values of another, converted from sRGB to linear light.
 fn decoded(image: DynamicImage) -> DynamicImage {
     let light: [u8; 256] = std::array::from_fn(|byte| {
         let linear_value = linear_light(byte as f32 / 255.0);
@@ -168,8 +172,8 @@ fn of_files_texture(node: &Node, images: Vec<DynamicImage>) -> Texture {
     Texture::of(&images)
 }
 
-/// Cuts the faces of a cube out of an image by `gridsize` and `gridlayout`; `None` without these. A face that
-/// the layout lacks has the colour `rgb1`.
+/// Cuts the faces of a cube out of an image by `gridsize` and `gridlayout`. Returns `None` without these. A
+/// face that the layout lacks has the colour `rgb1`.
 fn faces_of_grid(node: &Node, whole: &DynamicImage) -> Option<Vec<DynamicImage>> {
     let mut sizes =
         node.attribute("gridsize")?.split_ascii_whitespace().map_while(|word| word.parse::<u32>().ok());
@@ -195,7 +199,7 @@ fn blank(node: &Node) -> RgbImage {
     RgbImage::from_pixel(1, 1, Rgb(builtin::first_colour(node)))
 }
 
-/// Returns the name of a texture: without one, that of its file.
+/// Returns the name of a texture, or that of its file if it has none.
 fn name(node: &Node) -> String {
     let file = || Path::new(node.attribute("file")?).file_stem()?.to_str();
     node.attribute("name").or_else(file).unwrap_or_default().to_owned()

@@ -34,7 +34,7 @@ struct Replicate<'a, 'i> {
     node: Node<'a, 'i>,
     /// Opening tag of the frame of each copy.
     frames: Vec<String>,
-    /// Text behind the names in each copy.
+    /// Suffix of the names in each copy.
     suffixes: Vec<String>,
 }
 
@@ -45,7 +45,7 @@ struct CopiedElement {
     names: Vec<CopiedName>,
 }
 
-/// End of an attribute that is or names a copied name.
+/// End of an attribute that defines a copied name or refers to one.
 #[derive(Clone)]
 struct CopiedName {
     end: usize,
@@ -56,7 +56,7 @@ struct CopiedName {
 
 /// Change at a range of the text.
 enum TextChange {
-    /// The suffixes of this number of replicates, counted from the outermost.
+    /// Suffixes of this number of replicates, counted from the outermost.
     Suffixes(usize),
     /// Copies of the content of a replicate.
     Copies(usize),
@@ -65,11 +65,11 @@ enum TextChange {
     Elements(&'static str),
 }
 
-/// Everything that is copied in a text.
+/// All content of a text that is copied.
 struct CopyPlan<'a, 'i> {
     source: &'a MjcfText,
     root: Node<'a, 'i>,
-    /// The ends of attributes are in this order, so that an inner one is before the outer one.
+    /// Ordered by the ends of their elements, so that an inner one is before the outer one.
     replicates: Vec<Replicate<'a, 'i>>,
     /// Indices of the replicates, by the numbers of their elements.
     numbers: BTreeMap<usize, usize>,
@@ -227,7 +227,7 @@ impl<'a, 'i: 'a> CopyPlan<'a, 'i> {
         Ok(())
     }
 
-    /// Returns an element of a section; `None` if it names no element of a replicate.
+    /// Returns a copied element of a section. Returns `None` if the element refers to nothing in a replicate.
     fn element(&self, node: &Node, section: &str) -> Result<Option<CopiedElement>, SimError> {
         let mut names = Vec::new();
         for (kind, attributes) in REFERENCES {

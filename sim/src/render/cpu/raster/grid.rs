@@ -50,7 +50,8 @@ impl<T: Copy> SampleRows<T> {
         &self.numbers[start..start + self.grid.width]
     }
 
-    /// Returns the slices that begin at a sample and at those below it; rows continue into the next ones.
+    /// Returns slices that begin at a sample and at the samples below it. Each is one stride long and may
+    /// extend into the next row.
     #[inline(always)]
     pub fn rows_from(&self, row: usize, column: usize) -> impl Iterator<Item = &[T]> {
         let stride = self.grid.stride();

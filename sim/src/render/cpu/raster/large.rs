@@ -4,18 +4,19 @@ use pulp::Simd;
 
 use super::{EDGES, Grid, LANE, Outlines, Reach, larger, smaller, whole_f32};
 
-/// Crossing of a line with a height: `x = slope_ratio * y + offset_value`.
+/// Line of an edge: `x = slope_ratio * y + offset_value`.
 #[derive(Clone, Copy)]
 struct Edge {
     slope_ratio: f64,
     offset_value: f64,
 }
 
-/// The samples of a triangle in one row of a grid: nearness at the first, and the step from each to the next.
+/// Samples of a triangle in one row of a grid: nearness at the first sample, and its step from sample to
+/// sample.
 #[derive(Clone, Copy)]
 struct Span {
     row: usize,
-    /// The first column and the first one beyond: whole numbers.
+    /// First column of the span and first column beyond it: whole numbers.
     column_values: [f32; 2],
     start_value: f32,
     step_value: f32,

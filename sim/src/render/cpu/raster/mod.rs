@@ -15,11 +15,11 @@ use pulp::Simd;
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 use small::{SMALL_BLOCKS, SMALL_ROWS};
 
-/// Images of some triangles.
+/// A batch of projected triangles.
 ///
-/// Their planes and the edges of large ones are f64. A floor triangle clipped at the near plane has
-/// corners 1e4 pixels off the image, and f32 gradients would err by centimetres. In f64 the edge that
-/// two triangles share is also the same for both, to the bit, and leaves no gap.
+/// Their planes, and the edges of large triangles, are f64. A floor triangle clipped at the near plane has
+/// corners 1e4 pixels off the image, and f32 gradients would err by centimetres. In f64, two triangles also
+/// have bit-identical common edges, which leave no gap.
 pub struct Outlines {
     count: usize,
     corners: [[Lanes; 3]; 3],
@@ -36,7 +36,7 @@ pub struct Outlines {
 
 type Wide = [f64; LANES];
 
-/// Ranges of samples of a grid that triangles can reach, the last ones included.
+/// Ranges of samples of a grid that triangles can reach, with inclusive ends.
 struct Reaches {
     some: [bool; LANES],
     x0: [u32; LANES],
@@ -45,7 +45,7 @@ struct Reaches {
     y1: [u32; LANES],
 }
 
-/// Range of samples of a grid that a triangle can reach, the last ones included.
+/// Range of samples of a grid that a triangle can reach, with inclusive ends.
 #[derive(Clone, Copy)]
 struct Reach {
     x0: u32,
@@ -54,7 +54,7 @@ struct Reach {
     y1: u32,
 }
 
-/// Corners that edges go from and to.
+/// Start and end corners of the edges.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
@@ -100,7 +100,7 @@ impl Outlines {
 }
 
 impl Reach {
-    /// Returns the number of blocks of each row that it spans.
+    /// Returns the number of blocks that the range spans in each row.
     #[inline(always)]
     fn blocks(self) -> usize {
         self.x1 as usize / LANES - self.x0 as usize / LANES + 1

@@ -5,14 +5,14 @@ use rapier3d::math::Vector;
 use crate::render::Camera;
 use crate::render::shading::SAMPLES;
 
-/// Origin and directions of the rays of an image's samples in the world, to a depth of 1 m.
+/// Origin and rays of an image's samples, world frame. Rays extend to a depth of 1 m.
 pub struct Rays {
     pub eye_m: Vector,
-    /// The ray through the first sample, and the steps from one to the next.
+    /// The ray through the first sample, and the steps to the next sample to the right and down.
     pub first_ray: Vector,
     pub right_ray: Vector,
     pub down_ray: Vector,
-    /// Direction from what the camera looks at to the camera.
+    /// Direction from the camera's target to the camera.
     pub back_direction: Vector,
 }
 

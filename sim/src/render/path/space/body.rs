@@ -16,12 +16,12 @@ use crate::render::{Part, Scenery};
 /// Sides of triangles that a ray can meet.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum MetSides {
-    /// The front is as for a rasteriser: a camera inside of its robot's head sees through the head.
+    /// Only the front, like a rasteriser: a camera inside its robot's head sees through the head.
     Front,
     Both,
 }
 
-/// A ray, and the range of distances at which it is met, in lengths of its direction.
+/// A ray, and the range of distances in which it is traced, in lengths of its direction.
 #[derive(Clone, Copy)]
 pub struct TracedRay {
     pub origin_m: Vec3A,
@@ -37,11 +37,11 @@ pub struct Body {
     looks: Vec<Look>,
     /// Texture coordinates at the corners of each triangle; empty if no part has any.
     corner_uv: Vec<[[f32; 2]; 3]>,
-    /// Corners of the bounding box, with the least coordinates and the greatest.
+    /// Corners of the bounding box: the smallest coordinates, then the largest.
     pub box_m: [Vector; 2],
 }
 
-/// A triangle, as intersections need it.
+/// Triangle in the form that intersection tests need.
 #[derive(Clone, Copy)]
 struct CornerAndEdges {
     corner_m: Vec3A,
@@ -69,9 +69,9 @@ pub struct BodyPoint {
     pub point_m: Vec3A,
     /// The point on the curved surface that the triangle approximates.
     pub curved_m: Vec3A,
-    /// Outwards, interpolated between the corners.
+    /// Outward normal, interpolated between the corners.
     pub normal: Vec3A,
-    /// Outwards, of the flat triangle.
+    /// Outward normal of the flat triangle.
     pub face_normal: Vec3A,
     pub uv: PointUv,
 }
@@ -81,7 +81,7 @@ pub struct BodyPoint {
 pub struct PointUv {
     pub uv: [f32; 2],
     pub uv_1_m: f32,
-    /// Directions in which each of them grows, of any length.
+    /// Directions in which each coordinate grows, of any length.
     pub gradients: [Vec3A; 2],
 }
 
@@ -183,7 +183,7 @@ impl PointUv {
 }
 
 impl TracedRay {
-    /// Returns the ray as hierarchies read it.
+    /// Converts the ray for the traversal of a hierarchy.
     #[inline(always)]
     pub fn traversed(&self) -> Ray {
         let [origin_m, direction] = [self.origin_m, self.direction].map(|vector| vector.to_array());

@@ -1,5 +1,5 @@
-//! All bodies in one state: the room, whose hierarchy is built once, and things at their poses, above which
-//! a small hierarchy is built for each state.
+//! All bodies in one state: the room, whose hierarchy is built once, and moving bodies at their poses. For
+//! each state, a small hierarchy is built over the moving bodies.
 
 pub mod body;
 
@@ -15,7 +15,7 @@ use rapier3d::math::{Pose, Vector};
 
 use body::{Body, BodyHit, BodyPoint, MetSides, PointUv, TracedRay};
 
-/// Distance from a surface at which rays start that leave it.
+/// Distance from a surface at which rays that leave it start.
 const OFF_M: f32 = 2e-4;
 
 /// Bodies at their poses.
@@ -25,14 +25,14 @@ pub struct Space<'a> {
     bvh: CwBvh,
 }
 
-/// A body that is not where its triangles are.
+/// A moving body, whose triangles are in its own frame.
 struct Thing<'a> {
     body: &'a Body,
     body_from_world: Mat3A,
     body_in_world_m: Vec3A,
 }
 
-/// A surface that a ray meets; `None` is the room.
+/// A surface that a ray meets; `thing` is `None` for the room.
 pub struct Hit {
     thing: Option<u32>,
     hit: BodyHit,
@@ -45,7 +45,7 @@ pub struct Spot {
     pub point_m: Vector,
     /// Start of the rays that leave the surface.
     pub start_m: Vector,
-    /// Towards the ray's origin, as [`Spot::face_normal`].
+    /// Normal on the side of the ray's origin, like [`Spot::face_normal`].
     pub normal: Vector,
     pub face_normal: Vector,
     pub uv: PointUv,
@@ -87,7 +87,7 @@ impl<'a> Space<'a> {
         nearest.map(|nearest| (nearest.hit.reach_m, nearest))
     }
 
-    /// Returns true if there is a surface between a point and another `reach_m` away.
+    /// Returns true if there is a surface between a point and the point `reach_m` away in a direction.
     #[inline]
     pub fn is_blocked(&self, origin_m: Vector, direction: Vector, reach_m: f32) -> bool {
         let (origin_m, direction) = (origin_m.into(), direction.into());

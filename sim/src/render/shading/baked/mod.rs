@@ -1,8 +1,8 @@
-//! Baked light, as rasterisers look it up.
+//! Lookup of baked light by rasterisers.
 //!
-//! Flat surfaces of the room have light maps. Everything else is lit by cubes of light, which are read from
-//! a grid of probes: curved surfaces of the room place by place, and things that move part by part. Things
-//! that move cast shadows by the rasterisers' own map; the share of light that they take is baked, too.
+//! Flat surfaces of the room have light maps. Everything else is lit by ambient cubes, interpolated in a grid
+//! of probes: curved surfaces of the room patch by patch, moving bodies part by part. Moving bodies cast
+//! shadows through the rasterisers' shadow map. The share of light that these shadows remove is baked, too.
 
 mod probes;
 
@@ -11,39 +11,39 @@ use serde::{Deserialize, Serialize};
 
 pub use probes::Probes;
 
-/// Cosine to the sun from which things shadow a surface wholly: shadows on what it grazes are uncertain.
+/// Minimum cosine to the sun at which shadows have full strength. Shadows of grazing light are uncertain.
 pub const SURE_SLOPE: f32 = 0.25;
 
-/// Distance of a thing at which it takes half of a lamp's light from what is behind it.
+/// Distance from a surface at which an object blocks half of a lamp's light.
 pub const HALF_SHADOW_M: f32 = 0.45;
 
 /// Light at a point: irradiance divided by pi in linear red, green and blue, and the share of it that comes
-/// from the lamps, which things can shadow.
+/// from the lamps. Moving bodies can shadow only this share.
 pub type LightTexel = [f32; 4];
 
-/// Light on surfaces that face along +x, -x, +y, -y, +z and -z.
+/// Ambient cube: light on surfaces that face along +x, -x, +y, -y, +z and -z.
 pub type LightCube = [LightTexel; 6];
 
-/// The light of a room.
+/// The baked light of a room.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct BakedLight {
-    /// Light of each sheet of the room, by the sheets' numbers.
+    /// Light of each patch of the room, by the patches' indices.
     pub sheets: Vec<SheetLight>,
     pub maps: Vec<LightMap>,
     /// Texels of all maps, map by map and row by row.
     pub texels: Vec<LightTexel>,
-    /// Cubes of the room's surfaces without a map.
+    /// Ambient cubes of the room's surfaces without a map.
     pub cubes: Vec<LightCube>,
     pub probes: Probes,
 }
 
-/// A map's place among all texels.
+/// Light map of a flat patch. Its texels are a range of all texels.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LightMap {
-    /// Map from the world to column and row: each is a scalar product plus a constant. The middle of the first
-    /// texel is 0.
+    /// Map from the world to column and row: each is a scalar product plus a constant. The centre of the
+    /// first texel is at (0, 0).
     pub axes_values: [[f32; 4]; 2],
-    /// Number of the first texel.
+    /// Index of the first texel.
     pub first: u32,
     /// Number of texels along each side, at least 2.
     pub width: u32,
@@ -56,21 +56,21 @@ pub struct SurfacePoint {
     pub point_m: Vector,
     /// Unit vector.
     pub normal: Vector,
-    /// Place among other points. Neighbours complement each other.
+    /// Grid position of the point, for its random numbers. The numbers of neighbours complement each other.
     pub seed: [u32; 2],
 }
 
-/// Source of the light of a sheet.
+/// Source of the light of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SheetLight {
-    /// Number of its map.
+    /// Index of its light map.
     Map(u32),
-    /// Number of its cube.
+    /// Index of its ambient cube.
     Cube(u32),
 }
 
 impl BakedLight {
-    /// Returns true if all numbers refer to something.
+    /// Returns true if all indices and sizes are valid.
     pub fn is_whole(&self) -> bool {
         let is_map = |map: &LightMap| {
             let end = u64::from(map.first) + u64::from(map.width) * u64::from(map.height);
@@ -83,14 +83,14 @@ impl BakedLight {
         self.maps.iter().all(is_map) && self.sheets.iter().all(is_lit) && self.probes.are_whole()
     }
 
-    /// Returns the light at a point in the room.
+    /// Returns the ambient cube at a point in the room.
     pub fn cube(&self, point_m: Vector) -> LightCube {
         self.probes.cube(point_m)
     }
 }
 
 impl LightMap {
-    /// Returns the column and the row of a point of the world, in texels from the middle of the first one.
+    /// Returns the column and the row of a point of the world, in texels from the centre of the first texel.
     #[inline(always)]
     pub fn place(&self, [x_m, y_m, z_m]: [f32; 3]) -> [f32; 2] {
         self.axes_values.map(
@@ -100,7 +100,7 @@ impl LightMap {
     }
 }
 
-/// Returns the light on a surface with a normal.
+/// Returns the light on a surface with this normal.
 /// Source: McTaggart 2004, Half-Life 2 / Valve Source shading, ambient cubes.
 #[inline(always)]
 pub fn cube_light(cube: &LightCube, normal: [f32; 3]) -> LightTexel {
@@ -114,8 +114,9 @@ pub fn cube_light(cube: &LightCube, normal: [f32; 3]) -> LightTexel {
     light
 }
 
-/// Returns the share of a lamp's light that things take: the share of the sun that they would hide, and that
-/// share times their distance. Lamps are wide, so shadows of what is far away are faint.
+/// Returns the share of a lamp's light that moving bodies block. `blocked_share` is the share of the sun that
+/// they would block, and `blocked_m` is this share times their distance. Lamps are wide, so distant bodies
+/// cast faint shadows.
 #[inline(always)]
 pub fn lamp_shadow(blocked_share: f32, blocked_m: f32) -> f32 {
     if blocked_share <= 0.0 {
@@ -125,7 +126,7 @@ pub fn lamp_shadow(blocked_share: f32, blocked_m: f32) -> f32 {
     blocked_share / (1.0 + ratio * ratio)
 }
 
-/// Returns the light at a place on a map, in texels from the middle of the first one.
+/// Returns the light at a position on a map, in texels from the centre of the first texel.
 #[inline(always)]
 pub fn map_light(map: &LightMap, texels: &[LightTexel], [u, v]: [f32; 2]) -> LightTexel {
     let (width, height) = (map.width as usize, map.height as usize);

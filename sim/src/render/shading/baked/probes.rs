@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{LightCube, SurfacePoint};
 
-/// Distance between probes, unless there would be too many.
+/// Distance between probes. It is larger in rooms that would need more than `MAX_PROBES`.
 const PITCH_M: f32 = 0.3;
 const MAX_PROBES: f32 = 6000.0;
 
@@ -14,7 +14,7 @@ pub struct Probes {
     corner_m: [f32; 3],
     pitch_m: f32,
     counts: [usize; 3],
-    /// Along x, then y, then z.
+    /// Ambient cubes in the order of [`Probes::points`]: x varies fastest, z slowest.
     pub cubes: Vec<LightCube>,
 }
 
@@ -35,7 +35,7 @@ impl Probes {
                 == Some(self.cubes.len())
     }
 
-    /// Returns the points of all probes, six directions each.
+    /// Returns the points of all probes, each with six normals.
     pub fn points(&self) -> impl Iterator<Item = SurfacePoint> {
         let [columns, rows, layers] = self.counts;
         (0..columns * rows * layers).flat_map(move |number| {
@@ -50,7 +50,7 @@ impl Probes {
         })
     }
 
-    /// Sets the light of the probes. A probe without light gets the mean of its neighbours.
+    /// Sets the light of the probes. A probe without light gets the mean of its neighbours' light.
     pub fn set(&mut self, mut cubes: Vec<Option<LightCube>>) {
         let [columns, rows, _] = self.counts;
         let steps = [1, columns, columns * rows];
@@ -71,8 +71,8 @@ impl Probes {
         self.cubes = cubes.into_iter().map(Option::unwrap_or_default).collect();
     }
 
-    /// Returns the light at a point, blended between the eight probes around it; beyond the grid, that at its
-    /// border.
+    /// Returns the light at a point, interpolated between the eight probes around it. Beyond the grid, the
+    /// light is that at the border.
     pub fn cube(&self, point_m: Vector) -> LightCube {
         let [columns, rows, _] = self.counts;
         let (mut first, mut shares) = ([0; 3], [0.0; 3]);

@@ -1,4 +1,4 @@
-//! One row for each episode, whether it counts or not, for further computation.
+//! Rows of single episodes, whether they count or not, for further analysis.
 
 mod parquet;
 
@@ -21,25 +21,25 @@ pub struct EpisodeRow {
     pub seed: u32,
     pub protocol: Protocol,
     pub assistance: Assistance,
-    /// Number of the phase at which the episode began; `task` for the task's beginning, `moment` for another
-    /// moment.
+    /// Number of the phase at which the episode began; `task` for the task's beginning, `moment` for any
+    /// other moment.
     pub start: String,
-    /// False if it is in no rate, because the policy itself or the simulator failed.
+    /// False if the episode is in no rate because the policy itself or the simulator failed.
     pub counted: bool,
     pub success: bool,
-    /// Simulated times at which phases were reached, by their numbers.
+    /// Simulated time at which each phase was reached, by phase number.
     pub phases_s: BTreeMap<String, Option<f64>>,
     pub ended: EndReason,
     pub steps: u32,
     pub requests: u32,
     pub thinking_s: f64,
     pub falls: u32,
-    /// Tokens of models, their price in US dollars and their time; `None` if no note has them.
+    /// Tokens of models, their price in US dollars and their response time; `None` if no note reports them.
     pub input_tokens: Option<u64>,
     pub output_tokens: Option<u64>,
     pub usd: Option<f64>,
     pub model_s: Option<f64>,
-    /// Number of earlier attempts, which do not count.
+    /// Number of earlier attempts that do not count.
     pub earlier_attempts: usize,
     pub controller: String,
     pub build: String,
@@ -48,7 +48,7 @@ pub struct EpisodeRow {
     pub note: Option<String>,
 }
 
-/// Returns the rows of all episodes, by policy.
+/// Returns the rows of all episodes, grouped by policy.
 pub fn rows(loaded: &LoadedEpisodes) -> Vec<EpisodeRow> {
     let groups = groups(loaded.episodes.iter());
     let rows = groups.iter().flat_map(|group| group.all().map(|played| EpisodeRow::of(&group.name, played)));
@@ -91,7 +91,7 @@ impl EpisodeRow {
         }
     }
 
-    /// Returns the cells by the names of their columns, with a column for each of `phases` phases.
+    /// Returns the names of the columns with their cells. The row has columns for `phases` phases.
     fn cells(self, phases: usize) -> Vec<(String, Cell)> {
         let time_s = |phase: usize| {
             let number = Phase::number(phase);
@@ -131,7 +131,7 @@ impl EpisodeRow {
     }
 }
 
-/// Returns the name of a value in JSON.
+/// Returns the JSON name of a value, for example of an enum variant.
 fn word(value: &impl Serialize) -> String {
     let value = serde_json::to_value(value).unwrap_or_default();
     value.as_str().unwrap_or_default().to_owned()

@@ -1,5 +1,5 @@
-//! Parquet files of one row group. A column is one page: a bit for each row that has a value, then these
-//! values, neither encoded nor compressed. Fields have the numbers of Parquet's Thrift definition.
+//! Parquet files with one row group. A column is one page: a bit for each row that has a value, then these
+//! values, neither encoded nor compressed. The numbers of fields are those in Parquet's Thrift definition.
 
 use super::Cell;
 
@@ -27,7 +27,7 @@ struct Chunk {
     length: usize,
 }
 
-/// Returns the file of a table. All columns have as many cells as there are rows.
+/// Returns the file of a table. Each column has `rows` cells.
 pub fn file(columns: &[(String, Vec<Cell>)], rows: usize) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     let mut chunks = Vec::new();
@@ -48,7 +48,7 @@ pub fn file(columns: &[(String, Vec<Cell>)], rows: usize) -> Vec<u8> {
 /// Returns the bits of the cells with values, then the values.
 fn page(cells: &[Cell]) -> Vec<u8> {
     let present: Vec<bool> = cells.iter().map(Cell::is_present).collect();
-    // A run of bits begins with twice its number of bytes, plus one.
+    // A bit-packed run begins with twice its number of bytes, plus one.
     let mut levels = Thrift::default();
     levels.varint(2 * present.len().div_ceil(8) as u64 + 1);
     levels.bytes.extend(bits(&present));
@@ -71,7 +71,7 @@ fn page(cells: &[Cell]) -> Vec<u8> {
     page
 }
 
-/// Returns eight flags a byte, the first in the lowest bit.
+/// Packs the flags into bytes, eight to a byte, the first in the lowest bit.
 fn bits(flags: &[bool]) -> impl Iterator<Item = u8> {
     flags.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, flag| byte << 1 | u8::from(*flag)))
 }
@@ -81,7 +81,7 @@ impl Cell {
         !matches!(self, Cell::Text(None) | Cell::Count(None) | Cell::Number(None))
     }
 
-    /// Returns Parquet's number of the type.
+    /// Returns the number of the type in Parquet.
     fn physical_type(&self) -> i64 {
         match self {
             Cell::Flag(_) => 0,
@@ -238,7 +238,7 @@ impl Thrift {
 mod tests {
     use super::*;
 
-    /// pyarrow has read these very bytes and found this table.
+    /// pyarrow has read exactly these bytes and found this table.
     #[test]
     fn a_table_is_the_known_file() {
         let texts = (0..9).map(|row| Cell::Text((row % 3 != 1).then(|| format!("é{row}")))).collect();

@@ -1,4 +1,4 @@
-//! Figures as SVG files of their own, with plain colours, for documents and for programs that convert them.
+//! Figures as stand-alone SVG files with fixed colours, for documents and converters.
 
 use tandem_episodes::html::escape;
 
@@ -6,7 +6,7 @@ use super::times::LINES;
 use super::{Figure, SERIES, colour_class, rates, times};
 use crate::reports::evaluation::policy::PolicyReport;
 
-/// Colours of policies; those of the page on a light background.
+/// Colours of policies, the same as on the page's light background.
 const COLOURS: [&str; SERIES] = ["#2459c9", "#c2570c", "#17804a", "#8b3fb8", "#b8392b", "#0d7c8c"];
 
 const STYLE: &str = "text { fill: #1d2024; font: 13.5px Helvetica, Arial, sans-serif; }
@@ -28,21 +28,21 @@ const STYLE: &str = "text { fill: #1d2024; font: 13.5px Helvetica, Arial, sans-s
 const MARGIN_PX: f64 = 16.0;
 const TITLE_PX: f64 = 26.0;
 const LEGEND_LINE_PX: f64 = 20.0;
-/// Maximum number of drawings beside each other.
+/// Maximum number of drawings side by side.
 const MAX_COLUMNS: usize = 3;
-/// Maximum width of a letter in the legend.
+/// Maximum width of a character in the legend.
 const LETTER_PX: f64 = 8.5;
-/// Width of the mark before a line of the legend.
+/// Width of the mark at the start of a line in the legend.
 const MARK_PX: f64 = 36.0;
 
-/// A line of the legend: a mark about a point, its class, and its meaning.
+/// A line of the legend: an SVG mark, its class, and its meaning.
 struct LegendLine {
     mark: String,
     class: String,
     text: String,
 }
 
-/// Returns the file with the rates of all phases, by task.
+/// Returns the file with the rates of all phases, one drawing per task.
 pub fn rates_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     let marks = rates::marks(policies).iter();
     let legend = marks.map(|(mark, text)| LegendLine {
@@ -59,8 +59,8 @@ pub fn rates_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     file(drawings, legend.chain([bar]).chain(colours(policies)).collect())
 }
 
-/// Returns the file with the curves of the times at which phases were reached, by task. The legend names the
-/// tasks in which no phase was reached.
+/// Returns the file with the curves of the times at which phases were reached, one drawing per task. The
+/// legend names the tasks in which no phase was reached.
 pub fn times_file(tasks: &[&str], policies: &[PolicyReport]) -> String {
     let phases = policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.phases.len()).max();
     let line = |number: usize| LegendLine {
@@ -142,7 +142,7 @@ fn colour_style((index, colour): (usize, &&str)) -> String {
 mod tests {
     use super::*;
 
-    /// Files have the colours of the page.
+    /// Files have the same colours as the page.
     #[test]
     fn colours_are_those_of_the_page() {
         let page = tandem_episodes::html::page("", "");

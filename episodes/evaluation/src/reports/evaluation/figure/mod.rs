@@ -1,4 +1,4 @@
-//! Figures of a report: drawings in SVG, which the page contains and which files hold alone.
+//! Figures of a report: SVG drawings that the page contains and that are also separate files.
 
 mod file;
 pub mod rates;
@@ -8,13 +8,13 @@ pub use file::{rates_file, times_file};
 
 use tandem_episodes::html::escape;
 
-/// Number of colours; more policies share them.
+/// Number of distinct colours. If there are more policies, several share a colour.
 pub const SERIES: usize = 6;
 
-/// A drawing of one task. Its shapes have the classes of the page's style.
+/// A drawing for one task. Its shapes use the classes of the page's style.
 pub struct Figure {
     pub title: String,
-    /// Description for readers who cannot see it.
+    /// Text description for readers who cannot see the figure.
     pub label: String,
     pub width_px: f64,
     pub height_px: f64,
@@ -22,7 +22,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Renders a card of the page.
+    /// Renders the figure as a card of the page.
     pub fn card(&self) -> String {
         let Figure { title, label, width_px, height_px, shapes } = self;
         format!(
@@ -33,7 +33,7 @@ impl Figure {
     }
 }
 
-/// Returns the class of a policy's colour.
+/// Returns the CSS class of a policy's colour.
 pub fn colour_class(policy: usize) -> String {
     format!("c{}", policy % SERIES)
 }

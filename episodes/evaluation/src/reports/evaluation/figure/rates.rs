@@ -1,5 +1,4 @@
-//! Figure of the rates of one task's phases: a mark for each rate on a line from 0 to 100 %, and its
-//! interval.
+//! Figure of the rates of one task's phases. Each rate has a mark on a line from 0 to 100 %, and an interval.
 
 use tandem_episodes::html::escape;
 
@@ -7,7 +6,7 @@ use super::{Figure, colour_class};
 use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
 use crate::reports::evaluation::rate::Rate;
 
-/// Function that draws a mark about a point.
+/// Function that draws a mark at a point.
 type Mark = fn(f64, f64) -> String;
 
 /// A mark for each kind of rate, and its meaning.
@@ -24,7 +23,7 @@ pub fn marks(policies: &[PolicyReport]) -> &'static [(Mark, &'static str)] {
 }
 
 const WIDTH_PX: f64 = 360.0;
-/// Position of 0 %; `RIGHT_PX` is that of 100 %.
+/// Horizontal position of 0 %; `RIGHT_PX` is the position of 100 %.
 const LEFT_PX: f64 = 8.0;
 const RIGHT_PX: f64 = 296.0;
 const HEADING_PX: f64 = 22.0;

@@ -1,5 +1,5 @@
-//! Figure of the times at which one task's phases were reached: for each phase and policy, the share of the
-//! episodes that had reached it by then.
+//! Figure of the times at which one task's phases were reached. Each curve shows, for a phase and a policy,
+//! the share of episodes that have reached the phase by then.
 
 use tandem_episodes::html::escape;
 
@@ -8,18 +8,18 @@ use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
 use crate::reports::evaluation::rate::percent;
 
 const WIDTH_PX: f64 = 360.0;
-/// Positions of the first and the last time, and of 100 % and 0 %.
+/// Horizontal positions of the first and the last time, and vertical positions of 100 % and 0 %.
 const LEFT_PX: f64 = 40.0;
 const RIGHT_PX: f64 = 350.0;
 const TOP_PX: f64 = 10.0;
 const BOTTOM_PX: f64 = 170.0;
 const HEIGHT_PX: f64 = 206.0;
 
-/// Number of kinds of lines; more phases share them.
+/// Number of distinct line styles. If there are more phases, several share a style.
 pub const LINES: usize = 4;
-/// Maximum number of intervals on the axis of times.
+/// Maximum number of intervals on the time axis.
 const MAX_INTERVALS: f64 = 6.0;
-/// Steps between the marks of that axis, in seconds.
+/// Possible distances between the ticks of that axis, in seconds.
 const STEPS_S: [f64; 11] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
 /// Draws the curves of one task; `None` if no episode has reached any of its phases.
@@ -45,7 +45,7 @@ pub fn figure(task: &str, policies: &[PolicyReport]) -> Option<Figure> {
     Some(Figure { title, label, width_px: WIDTH_PX, height_px: HEIGHT_PX, shapes })
 }
 
-/// Renders the curve of one phase: a step up at each time at which an episode reached it.
+/// Renders the curve of one phase. It steps up at each time at which an episode reached the phase.
 fn curve(policy: &str, number: usize, phase: &PhaseReport, end_s: f64) -> String {
     let Some(rate) = phase.cumulative else { return String::new() };
     let mut path = format!("M{LEFT_PX} {BOTTOM_PX}");

@@ -1,4 +1,4 @@
-//! Floors: success of policies without perception, which hold still, or replay a demonstration of another
+//! Floors: success of policies without perception, which hold still or replay a demonstration of another
 //! seed. A policy whose rate is not higher has not shown that it uses its observations.
 
 use std::collections::BTreeSet;
@@ -15,23 +15,24 @@ use super::rate::Rate;
 use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
 use crate::statistics::Count;
 
-/// Earlier measurements, for reports that include no such policy.
+/// Earlier measurements, for reports without such policies.
 const SHIPPED: &str = include_str!("floors.csv");
 
 /// Policies without perception.
 const PLAYERS: [&str; 2] = [IDLE, OPEN_LOOP];
 
-/// Rate of the whole task above which it says little about a policy's perception.
+/// Success rate of a floor above which success in the task says little about a policy's perception.
 const HIGH_SHARE: f64 = 0.5;
 
 /// The floor of one task.
 #[derive(Debug, Serialize)]
 pub struct TaskFloor {
     pub task: String,
-    /// Departures of its episodes from the benchmark, without those on information for policies.
+    /// Departures of its episodes from the benchmark, except for those about information that policies are
+    /// shown.
     pub departures: Vec<String>,
     pub players: Vec<FloorRate>,
-    /// True if any of the players solves the task in more than half of the episodes.
+    /// True if any of the players succeeds in more than half of the episodes.
     pub is_high: bool,
 }
 
@@ -40,17 +41,17 @@ pub struct TaskFloor {
 pub struct FloorRate {
     pub player: &'static str,
     pub protocol: String,
-    /// Source of the figures: the report's own episodes, or seeds and build of earlier ones.
+    /// Source of the figures: the report's own episodes, or seeds and build of earlier measurements.
     pub measured: String,
     /// Cumulative rates, by phase.
     pub phases: Vec<Rate>,
 }
 
-/// Task and departures for which a floor is measured or needed.
+/// Task and departures to which a floor applies.
 type FloorKey = (String, Vec<String>);
 
-/// Returns the floors of all played tasks in the order of the list of tasks, without tasks whose floor is
-/// unknown.
+/// Returns the floors of all played tasks in the order of the task list. Tasks with an unknown floor are left
+/// out.
 pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloor> {
     let places: BTreeSet<FloorKey> =
         groups.iter().flat_map(|group| &group.episodes).map(|found| place(&found.played)).collect();
@@ -83,8 +84,8 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
     floors
 }
 
-/// Returns the task and the departures of an episode. Information for policies is ignored, because it does
-/// not affect a policy without perception.
+/// Returns the task and the departures of an episode. Departures about information for policies are ignored,
+/// because they do not affect a policy without perception.
 fn place(played: &PlayedEpisode) -> FloorKey {
     let spec = EpisodeSpec { instructions: None, ..played.spec.clone() }.assisted(Assistance::Paper);
     (spec.task.id.clone(), spec.peculiarities())
@@ -174,7 +175,7 @@ mod tests {
         assert!(text.contains("## The floor") && text.contains("It is above 50 % of handover:"), "{text}");
         assert!(text.contains("60 [26.2, 87.8] 6/10"), "{text}");
 
-        // A floor belongs to its task and departures: a wider spread has another one.
+        // A floor belongs to a task and its departures: a wider spread has a different floor.
         let spec = |played: &PlayedEpisode| EpisodeSpec {
             variation: Variation { spread: Spread::Double, ..Variation::default() },
             ..played.spec.clone()

@@ -1,4 +1,4 @@
-//! Policy of an episode that `tandem agent` has played, from the file with its flags.
+//! Policy of an episode that `tandem agent` has played, read from the file with its flags.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,8 @@ use serde_json::{Map, Value};
 /// File in an episode's folder with the flags of `tandem agent`.
 const AGENT_FILE: &str = "agent.json";
 
-/// Flags that are no settings of the model: those of the episode, and limits that a resumed play may change.
+/// Flags that are not settings of the model: episode settings, and limits that may change when play is
+/// resumed.
 const OTHER_FLAGS: [&str; 12] = [
     "task",
     "seed",
@@ -26,13 +27,13 @@ const OTHER_FLAGS: [&str; 12] = [
     "usd_per_million_cached",
 ];
 
-/// Part of the file that is read here. Operators' tokens are not.
+/// The part of the file that is read here; operators' tokens are not read.
 #[derive(Deserialize)]
 struct AgentFile {
     flags: Map<String, Value>,
 }
 
-/// Returns the policy that played in an episode's folder; `None` if no file names one.
+/// Returns the policy that played the episode in this folder; `None` if no file names it.
 pub fn card(folder: &Path) -> Option<PolicyCard> {
     let AgentFile { mut flags } = serde_json::from_slice(&fs::read(folder.join(AGENT_FILE)).ok()?).ok()?;
     let model = flags.remove("model")?.as_str()?.to_owned();

@@ -1,4 +1,4 @@
-//! Loading of episodes from folders: single results by `evaluate` and `collect`, and recordings by `serve`.
+//! Loading of episodes from folders: single results of `evaluate` and `collect`, and recordings of `serve`.
 
 mod agent_file;
 
@@ -13,7 +13,7 @@ use tandem_episodes::{
 
 use crate::results::{EPISODES, PlayedEpisode, PolicyCard, ProcessRecord, STRESS, episode_note, utc_text};
 
-/// One episode.
+/// One episode, with its files.
 #[derive(Clone, Debug)]
 pub struct FoundEpisode {
     pub played: PlayedEpisode,
@@ -21,15 +21,15 @@ pub struct FoundEpisode {
     pub strip: Option<PathBuf>,
     /// Path of its recording; `None` if there is none.
     pub recording: Option<PathBuf>,
-    /// Path of its own page; `None` if there is none.
+    /// Path of its page; `None` if there is none.
     pub page: Option<PathBuf>,
-    /// Its folder relative to the runs folder. The runs folder is assumed to be the parent of the reported
-    /// folder, or the reported folder itself.
+    /// Folder of the episode, relative to the runs folder. The runs folder is assumed to be the parent of the
+    /// reported folder, or the reported folder itself.
     pub run: String,
 }
 
 impl FoundEpisode {
-    /// Creates an episode, with the files of its run folder.
+    /// Creates an episode with the files in its run folder.
     fn new(played: PlayedEpisode, folder: &Path, runs: &Path) -> FoundEpisode {
         let file = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
         let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
@@ -45,7 +45,7 @@ pub struct LoadedEpisodes {
     pub episodes: Vec<FoundEpisode>,
     /// Processes that have played in the folders.
     pub processes: Vec<FolderProcess>,
-    /// Files that are no episodes, with the reasons.
+    /// Files that contain no episode, with the reasons.
     pub skipped: Vec<String>,
 }
 
@@ -67,7 +67,7 @@ pub enum LoadError {
     Nothing(PathBuf),
 }
 
-/// Loads every episode of every folder, each once.
+/// Loads every episode of every folder once.
 ///
 /// # Errors
 ///
@@ -83,7 +83,8 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
         }
         let stressed = folder.join(STRESS);
         if stressed.is_dir() {
-            // Output of `evaluate --stress` beside the plain run, a folder per axis and level.
+            // Output of `evaluate --stress` in the folder of the plain run: one folder for each axis and
+            // level.
             for plan in entries(&stressed)?.into_iter().filter(|plan| plan.join(EPISODES).is_dir()) {
                 load_results(&plan.join(EPISODES), folder, &mut loaded)?;
                 loaded.add_processes(&plan);
@@ -114,7 +115,7 @@ impl LoadedEpisodes {
     }
 }
 
-/// Loads the results of single episodes of the evaluation in `evaluation`, each in a file.
+/// Loads the results of single episodes, one file each. `evaluation` is the folder of their evaluation.
 fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = evaluation.canonicalize().unwrap_or_else(|_| evaluation.into());
     let runs = absolute.parent().unwrap_or(&absolute);
@@ -128,8 +129,8 @@ fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -
     Ok(())
 }
 
-/// Loads the recordings of a server, each in a folder. The policy is that of `tandem agent`, if it has
-/// played, and otherwise has the name of the folder which contains them.
+/// Loads the recordings of a server, one folder each. The policy is that of `tandem agent` if it has played;
+/// otherwise it has the name of the folder that contains the recordings.
 fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
@@ -164,7 +165,7 @@ fn recorded(path: &Path, folder_name: &str) -> Result<PlayedEpisode, String> {
     })
 }
 
-/// Returns the entries of a folder, by name.
+/// Returns the entries of a folder, sorted by name.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, LoadError> {
     let failed = |source| LoadError::Read { path: folder.into(), source };
     let entries = std::fs::read_dir(folder).map_err(failed)?;

@@ -1,5 +1,5 @@
-//! Videos of each task: one of a successful episode and one of a failed one, or the reason why there is
-//! none.
+//! Videos for each task: one of a successful episode and one of a failed episode. A missing video is replaced
+//! by the reason.
 
 use std::path::PathBuf;
 
@@ -8,17 +8,17 @@ use tandem_episodes::{html::escape, pages::moments, tasks};
 use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
 use crate::reports::evaluation::policy::{failure_cause, groups};
 
-/// The place of a video on the page.
+/// A place for a video on the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPlace {
     pub task: String,
     /// True for the video of a successful episode.
     pub success: bool,
-    /// The episode to show, or the reason why there is none.
+    /// The episode to show, or the reason why no episode can be shown.
     pub episode: Result<FilmedEpisode, String>,
 }
 
-/// An episode that has a recording.
+/// An episode with a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmedEpisode {
     pub policy: String,
@@ -28,11 +28,11 @@ pub struct FilmedEpisode {
     pub recording: PathBuf,
 }
 
-/// A video in its place.
+/// A video with its place on the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     pub place: FilmPlace,
-    /// The video, or the reason why there is none.
+    /// The video, or the reason why it could not be made.
     pub content: Result<FilmContent, String>,
 }
 
@@ -42,8 +42,8 @@ pub struct FilmContent {
     pub speed_ratio: f64,
 }
 
-/// Returns two places for each played task. Each has the first recorded episode of the first policy that
-/// has one.
+/// Returns two places for each played task. Each place has the first recorded episode of the first policy
+/// that has a suitable one.
 pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
     let groups = groups(loaded.episodes.iter());
     let episodes: Vec<(&str, &FoundEpisode)> = groups
@@ -86,7 +86,7 @@ fn choose<'a>(
     })
 }
 
-/// Renders the videos as a part of the page; empty if there are none.
+/// Renders the videos as a section of the page; empty if there are none.
 pub fn html(films: &[Film]) -> String {
     if films.is_empty() {
         return String::new();

@@ -1,4 +1,4 @@
-//! Gallery of failures with their key moments, as small images.
+//! Gallery of failures, with small images of their key moments.
 
 use tandem_episodes::{
     html::escape,
@@ -17,17 +17,17 @@ pub struct Failure {
     pub policy: String,
     pub task: String,
     pub seed: u32,
-    /// Number of the first phase that counts and was not reached.
+    /// Number of the first counted phase that was not reached.
     pub phase: String,
     pub why: String,
     /// Key moments; empty if the strip cannot be read.
     pub moments: Vec<KeyMoment>,
 }
 
-/// Scale of the strip's images, which are 400 pixels wide, on the page.
+/// Scale at which the page shows the strip's images, which are 400 pixels wide.
 const SCALE: f64 = 0.5;
 
-/// Returns at most `most` failures that have images, in turns from every policy and task.
+/// Returns at most `most` failures with images, taken in turn from each policy and task.
 pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     let pictured = failed_by_turns(loaded, most, |found| found.strip.is_some()).into_iter();
     let pictured = pictured.map(|(policy, found)| {
@@ -55,7 +55,7 @@ fn failure(policy: &str, found: &FoundEpisode) -> Failure {
     }
 }
 
-/// Renders failures with their key moments as a part of the page.
+/// Renders failures with their key moments as a section of the page.
 pub fn html(pictures: &ReportPictures, policies: &[PolicyReport]) -> String {
     let failures = &pictures.failures;
     let failed: usize =

@@ -1,4 +1,4 @@
-//! The report as one self-contained page: no script, no font, no image from elsewhere.
+//! The report as one self-contained page: no script, external font or external image.
 
 pub mod films;
 pub mod gallery;
@@ -21,7 +21,7 @@ use gallery::Failure;
 pub struct ReportPictures {
     pub films: Vec<Film>,
     pub failures: Vec<Failure>,
-    /// Number of failures that have images, shown or not.
+    /// Number of failures with images, shown or not.
     pub pictured_failures: usize,
 }
 
@@ -87,7 +87,7 @@ fn cards(report: &EvaluationReport, draw: fn(&str, &[PolicyReport]) -> Option<Fi
     drawings.map(|drawing| drawing.card()).collect()
 }
 
-/// Renders the curves of the times at which phases were reached; empty if none was.
+/// Renders the curves of the times at which phases were reached; empty if no phase was reached.
 fn phase_times(report: &EvaluationReport) -> String {
     let curves = cards(report, times::figure);
     if curves.is_empty() {
@@ -100,7 +100,8 @@ fn phase_times(report: &EvaluationReport) -> String {
     )
 }
 
-/// Renders a policy's summary: whole tasks by number of robots, phases by collaboration, rules and build.
+/// Renders a policy's summary: rates of whole tasks by number of robots, rates of phases by collaboration,
+/// rules and build.
 fn card(index: usize, policy: &PolicyReport) -> String {
     let mut facts: Vec<(String, String)> = Vec::new();
     for average in &policy.averages {
@@ -108,7 +109,7 @@ fn card(index: usize, policy: &PolicyReport) -> String {
             facts.push((format!("Tasks of {} robots, %", average.robots), mean.text()));
         }
     }
-    // The benchmark's means are over tasks of two robots, so two need not be mentioned.
+    // The benchmark's means are over tasks for two robots, so this number is not mentioned.
     let apart = |robots: usize| if robots == 2 { String::new() } else { format!(", {robots} robots") };
     for means in &policy.together {
         let phases = [("alone", &means.alone), ("together", &means.together)];

@@ -1,4 +1,4 @@
-//! Plot of rates under stress: for each axis a bar for each level, with its interval, and a line at the
+//! Plot of rates under stress. For each axis, it has a bar with an interval for each level. A line shows the
 //! rate without stress.
 
 use tandem_episodes::{html::escape, stress::StressAxis};
@@ -7,7 +7,7 @@ use crate::reports::evaluation::rate::percent;
 use crate::reports::evaluation::stress::{StressReport, StressRow};
 
 const WIDTH_PX: f64 = 640.0;
-/// End of the axes' names, and position of 0 %; `RIGHT_PX` is that of 100 %.
+/// Horizontal position of 0 %, 8 px to the right of the axes' names; `RIGHT_PX` is the position of 100 %.
 const LEFT_PX: f64 = 78.0;
 const RIGHT_PX: f64 = 560.0;
 const TOP_PX: f64 = 18.0;
@@ -15,7 +15,7 @@ const LANE_PX: f64 = 12.0;
 const GAP_PX: f64 = 8.0;
 const AXIS_PX: f64 = 20.0;
 
-/// Renders the part of the page on stress; empty if there is none.
+/// Renders the section of the page about stress; empty if there is no such report.
 pub fn html(reports: &[StressReport]) -> String {
     let cards: String = reports.iter().map(card).collect();
     match cards.is_empty() {

@@ -1,5 +1,5 @@
-//! Published figures of the benchmark's tasks, from another simulator with other robot controllers: for
-//! orientation, not for comparison. They are facts and figures only.
+//! Published figures for the benchmark's tasks, from another simulator with other robot controllers. They are
+//! for orientation, not for comparison. They are facts and figures only.
 
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub struct PublishedRates {
     pub phases_share: Vec<f64>,
 }
 
-/// Means of one method over phases at which episodes began.
+/// Mean rates of one method over the phases at which episodes began.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PublishedAverages {
     pub method: String,
@@ -48,7 +48,7 @@ pub fn averages() -> Vec<PublishedAverages> {
     PHASE_LEVEL.lines().skip(1).filter_map(row).collect()
 }
 
-/// Converts cells in percent to shares.
+/// Converts cells with percentages to shares.
 fn shares<'a>(cells: impl Iterator<Item = &'a str>) -> Option<Vec<f64>> {
     cells.map(|cell| cell.parse::<f64>().ok().map(|percent| percent / 100.0)).collect()
 }

@@ -14,7 +14,7 @@ use crate::results::named;
 use crate::statistics::Count;
 use models::{agents, asked, endings};
 
-/// Returns every table that has rows.
+/// Returns all tables that have rows.
 pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let policies = &report.policies;
     let mut tables = vec![header::settings(&report.header), header::processes(&report.header)];
@@ -108,7 +108,7 @@ fn floors(floors: &[TaskFloor]) -> Table {
     table
 }
 
-/// Returns the task, with its departures from the benchmark.
+/// Returns the name of the task, with its departures from the benchmark.
 fn task_of(floor: &TaskFloor) -> String {
     named(&floor.task, &floor.departures)
 }
@@ -397,7 +397,7 @@ pub fn published(rows: &[PublishedRates]) -> Table {
     table
 }
 
-/// Lists the published averages, which are shown only beside Tandem's own.
+/// Lists the published averages. They are shown only if the report has phase-level rates.
 fn published_together(report: &EvaluationReport) -> Table {
     let mut table = Table::new(
         "Published from the phases' beginnings, on another scale",

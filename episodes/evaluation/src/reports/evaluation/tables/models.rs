@@ -1,11 +1,11 @@
-//! Tables of language models: requests, costs, and endings of their play.
+//! Tables of language models: requests, costs, and endings of play.
 
 use super::super::costs::{CostSum, ValueRange};
 use super::super::policy::{PolicyReport, TaskReport};
 use super::super::rate::percent;
 use crate::reports::table::{NONE, Table};
 
-/// Compares policies task by task; only tasks with notes of any policy have rows.
+/// Compares policies task by task. Only tasks for which any policy has notes have rows.
 pub fn agents(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Agents",
@@ -104,7 +104,7 @@ pub fn asked(policies: &[PolicyReport]) -> Table {
     table
 }
 
-/// Lists endings of the play of models, with their episodes.
+/// Lists the endings of the models' play, with the numbers of episodes.
 pub fn endings(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "How the play of models ended",

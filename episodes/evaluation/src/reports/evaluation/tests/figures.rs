@@ -50,7 +50,7 @@ fn curves_step_up_where_episodes_reached_a_phase() {
         })
         .filter_map(|node| node.attribute("d"))
         .collect();
-    // 310 px are 12 s, and 160 px are all episodes.
+    // 310 px correspond to 12 s, and 160 px to all episodes.
     let ends: Vec<Option<&str>> = curves.iter().map(|path| path.rsplit('H').nth(1)).collect();
     assert_eq!(ends, [Some("143.3V26.0"), Some("246.7V74.0"), Some("350.0V122.0")], "{curves:?}");
 }

@@ -2,13 +2,14 @@
 
 use super::*;
 
-/// Each task has two videos, or the reason why it has none.
+/// Each task has two videos, or the reasons for missing videos.
 #[test]
 fn films_are_of_one_success_and_one_failure() {
     let mut loaded = found(nine_six_three("agent"));
     let succeeding = tasks::find("pouring").unwrap();
     loaded.episodes.extend(found(vec![played("agent", &succeeding, 4, succeeding.phases.len())]).episodes);
-    // Seeds 0 to 2 of Handover succeeded. The first of these, and of the failed ones, was not recorded.
+    // Seeds 0 to 2 of Handover succeeded. The first of these seeds, and the first failed seed, was not
+    // recorded.
     for (index, recorded) in [(1, "one"), (2, "two"), (4, "four")] {
         loaded.episodes[index].recording = Some(recorded.into());
     }

@@ -1,4 +1,4 @@
-//! Headers, and rows of single episodes.
+//! Tests of headers and of the rows of single episodes.
 
 use super::*;
 use crate::results::ProcessRecord;
@@ -42,7 +42,7 @@ fn a_header_names_commands_machines_and_settings() {
     assert_eq!(json["header"]["processes"][0]["machine"]["os"], process.machine.os);
 }
 
-/// Episodes that do not count have rows, too, and every row has all columns.
+/// Episodes that do not count also have rows, and every row has all columns.
 #[test]
 fn every_episode_is_a_row() {
     let mut episodes = nine_six_three("a, \"b\"");

@@ -41,7 +41,7 @@ fn every_environment_ends_where_it_should() {
     assert!(open.is_empty() && text.matches("\\begin{tabular}").count() > 8, "{open:?}: {text}");
 }
 
-/// Every row has a cell for each column, and contains no commands but ours.
+/// Every row has a cell for each column, and contains only the commands that we write.
 #[test]
 fn rows_have_the_columns_of_their_tables() {
     let text = report();

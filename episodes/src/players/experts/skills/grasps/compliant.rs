@@ -1,5 +1,5 @@
-//! Compliant grasp and release of objects that partners hold, too: hands give way to the forces that they
-//! feel, so that no robot is pulled.
+//! Compliant grasp and release of objects that partners also hold. Hands yield to the sensed forces, so that
+//! no robot is pulled.
 
 use tandem_sim::Vector;
 
@@ -22,7 +22,7 @@ const LEAVE_S: f32 = 1.2;
 const GIVE_S: f32 = 0.1;
 const GIVES: usize = 16;
 const CLOSING_GIVES: usize = 6;
-/// Stiffness against which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
+/// Stiffness against which a wrist yields in each step; `MAX_GIVE_M` limits the distance.
 const STIFFNESS_N_M: f32 = 300.0;
 const MAX_GIVE_M: f32 = 0.01;
 /// Maximum distance of a wrist's goal from the wrist.
@@ -62,8 +62,8 @@ fn grasp_from(commander: &mut Commander, grasps: &[HandGrasp], first_stop: usize
     Err(PlayerError::GaveUp("not every hand could take hold".into()))
 }
 
-/// Closes hands at the poses in `around`. Each wrist's goal makes up for its position error, for example
-/// after it has given way to partners. It also gives way to the forces that the hand feels.
+/// Closes hands at the poses in `around`. Each wrist's goal compensates for its position error, for example
+/// after it has yielded to partners. It also yields to the forces that the hand senses.
 fn close_compliantly(
     commander: &mut Commander,
     grasps: &[HandGrasp],

@@ -93,7 +93,7 @@ impl CylinderGrasp<'_> {
         Ok(self.reach(goal * object.inverse() * wrist))
     }
 
-    /// Returns the rotation of the held object when its axis is upright and the hand points along its
+    /// Returns the rotation of the held object for which its axis is upright and the hand points along its
     /// heading.
     fn upright_rotation(&self, object: Pose, wrist: Pose) -> Rotation {
         let held = wrist.rotation.inverse() * object.rotation;

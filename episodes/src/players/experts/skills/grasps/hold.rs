@@ -1,4 +1,4 @@
-//! Holds as data: the hand's turn, the position of the place in the hand, the closure of the fingers, the
+//! Holds as data: the hand's rotation, the position of the place in the hand, the closure of the fingers, the
 //! stops, and the robot's distance. They are given for right hands; left hands mirror them.
 
 use std::f32::consts::FRAC_PI_2;
@@ -10,8 +10,8 @@ use super::cylinder::{OPEN_RAD, wrapped_rad};
 /// Hold of a place on an object by a right hand.
 #[derive(Clone, Copy)]
 pub struct Hold {
-    /// Rotation of the wrist against the robot's heading: about z, then about the wrist's y, then about its
-    /// x.
+    /// Rotation of the wrist relative to the robot's heading: about z, then about the wrist's y, then about
+    /// its x.
     pub turned_rad: [f32; 3],
     /// Position of the place in the wrist's frame while the hand holds it.
     pub place_in_wrist_m: Vector,
@@ -26,7 +26,7 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// A bar of 36 mm along the wrist's z axis; the place is the bar's axis. The palm is on the bar, with
+    /// A bar 36 mm thick along the wrist's z axis; the place is the bar's axis. The palm is on the bar, with
     /// fingers and thumb round it.
     pub const BAR: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
@@ -38,9 +38,9 @@ impl Hold {
         behind_m: 0.29,
     };
 
-    /// The edge of a plate of 30 mm; the place is the lower edge. Palm and fingers are on the plate, the
-    /// thumb round its edge and below. The hand comes from outside, above the plate, and then down. For
-    /// other plates, y is 17 mm plus their thickness.
+    /// The edge of a plate 30 mm thick; the place is the lower edge. Palm and fingers are on the plate, and
+    /// the thumb reaches round its edge from below. The hand comes from outside, above the plate, and then
+    /// moves down. For other plates, y is 17 mm plus their thickness.
     pub const EDGE: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.085, 0.047, 0.0),
@@ -52,13 +52,13 @@ impl Hold {
         behind_m: 0.32,
     };
 
-    /// The edge of a round plate of 0.8 m and 30 mm: [`Hold::EDGE`] with the hands turned to the plate's
-    /// middle.
+    /// The edge of a round plate 0.8 m wide and 30 mm thick: [`Hold::EDGE`] with the hands turned to the
+    /// plate's middle.
     pub const ROUND_EDGE: Hold = Hold { turned_rad: [0.15, 0.0, -FRAC_PI_2], behind_m: 0.29, ..Hold::EDGE };
 
-    /// An upright square leg of 28 mm; the place is the leg's axis. The palm is on its outer side, thumb
-    /// and fingers round it. The hand comes and leaves a little lower, because the object on the leg rests
-    /// on the hand.
+    /// An upright square leg 28 mm wide; the place is the leg's axis. The palm is on its outer side, with
+    /// thumb and fingers round it. The hand comes and leaves a little lower, because the object on the leg
+    /// rests on the hand.
     pub const LEG: Hold = Hold {
         turned_rad: [0.0, 0.0, 0.0],
         place_in_wrist_m: Vector::new(0.100, 0.032, 0.0),
@@ -69,8 +69,8 @@ impl Hold {
         behind_m: 0.38,
     };
 
-    /// A rim of 24 mm from above; the place is the rim's axis. The palm is on it, fingers inside, the thumb
-    /// outside.
+    /// A rim 24 mm thick, grasped from above; the place is the rim's axis. The palm is on it, with the
+    /// fingers inside and the thumb outside.
     pub const RIM: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.095, 0.031, 0.0),
