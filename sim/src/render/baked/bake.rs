@@ -4,12 +4,12 @@ use std::collections::HashMap;
 
 use rapier3d::math::{Pose, Vector};
 
-use super::maps::FlatSheet;
+use super::maps::FlatPatch;
 use crate::render::path::irradiance::{Irradiance, irradiance};
 use crate::render::path::toned_rgb;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::baked::{
-    BakedLight, LightCube, LightMap, LightTexel, Probes, SheetLight, SurfacePoint, cube_light,
+    BakedLight, LightCube, LightMap, LightTexel, PatchLight, Probes, SurfacePoint, cube_light,
 };
 use crate::render::{Carrier, Light, Scenery};
 
@@ -27,15 +27,15 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let box_m = [low_m - Vector::splat(MARGIN_M), high_m + Vector::splat(MARGIN_M)];
     let prepared = Prepared::new(room.clone());
     let corners = corners(&prepared);
-    let mut flat: Vec<Option<FlatSheet>> = sheets(&prepared, &corners, box_m);
-    let texel_factor = FlatSheet::fit(&mut flat);
+    let mut flat: Vec<Option<FlatPatch>> = patches(&prepared, &corners, box_m);
+    let texel_factor = FlatPatch::fit(&mut flat);
     let (mut maps, mut points): (Vec<LightMap>, Vec<SurfacePoint>) = (Vec::new(), Vec::new());
-    let sheet_map: Vec<Option<u32>> = flat
+    let patch_map: Vec<Option<u32>> = flat
         .iter()
-        .map(|sheet| {
-            let sheet = sheet.as_ref()?;
-            let map = sheet.map(points.len() as u32, texel_factor);
-            points.extend(sheet.points(&map));
+        .map(|patch| {
+            let patch = patch.as_ref()?;
+            let map = patch.map(points.len() as u32, texel_factor);
+            points.extend(patch.points(&map));
             maps.push(map);
             Some(maps.len() as u32 - 1)
         })
@@ -55,45 +55,45 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     probes.set(found[mapped..].chunks_exact(6).map(cube).collect());
     let (mut cells, mut cubes) = (HashMap::new(), Vec::new());
     let middles_m = middles_m(&prepared, &corners);
-    let sheets = sheet_map.iter().zip(middles_m).map(|(map, middle_m)| match map {
-        Some(map) => SheetLight::Map(*map),
+    let patches = patch_map.iter().zip(middles_m).map(|(map, middle_m)| match map {
+        Some(map) => PatchLight::Map(*map),
         None => {
             let cell = (middle_m / CELL_M).round();
-            SheetLight::Cube(*cells.entry(cell.to_array().map(|i| i as i32)).or_insert_with(|| {
+            PatchLight::Cube(*cells.entry(cell.to_array().map(|i| i as i32)).or_insert_with(|| {
                 cubes.push(probes.cube(cell * CELL_M));
                 cubes.len() as u32 - 1
             }))
         }
     });
-    let sheets = sheets.collect();
+    let patches = patches.collect();
     // A map that is completely inside an object has no light of its own, but an edge of it may be visible.
     let texels = texels.into_iter().zip(&points).map(|(texel, point)| {
         texel.unwrap_or_else(|| cube_light(&probes.cube(point.point_m), point.normal.to_array()))
     });
     let texels = texels.collect();
-    BakedLight { sheets, maps, texels, cubes, probes }
+    BakedLight { patches, maps, texels, cubes, probes }
 }
 
 /// Returns the flat patches of a room, by patch index; `None` for patches without a light map.
-fn sheets(prepared: &Prepared, corners: &[Vec<Vector>], box_m: [Vector; 2]) -> Vec<Option<FlatSheet>> {
-    let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
-        let part = &prepared.scenery.parts[sheet.part as usize];
+fn patches(prepared: &Prepared, corners: &[Vec<Vector>], box_m: [Vector; 2]) -> Vec<Option<FlatPatch>> {
+    let patches = prepared.patches.iter().zip(corners).map(|(patch, corners_m)| {
+        let part = &prepared.scenery.parts[patch.part as usize];
         // Reliefs need light from several directions.
         let is_even = part.image.as_ref().is_none_or(|image| image.relief.is_none());
-        (sheet.bend.slope_1_m.is_none() && is_even)
-            .then(|| FlatSheet::of(corners_m, sheet.bend.normal.normalize(), part.carrier_from_mesh, box_m))
+        (patch.bend.slope_1_m.is_none() && is_even)
+            .then(|| FlatPatch::of(corners_m, patch.bend.normal.normalize(), part.carrier_from_mesh, box_m))
             .flatten()
     });
-    sheets.collect()
+    patches.collect()
 }
 
 /// Returns the corners of each patch's triangles, in the mesh's frame.
 fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
-    let mut corners = vec![Vec::new(); prepared.sheets.len()];
+    let mut corners = vec![Vec::new(); prepared.patches.len()];
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
-        for (triangle, sheet) in part.mesh.triangles.iter().zip(prepared.sheets_of(number)) {
+        for (triangle, patch) in part.mesh.triangles.iter().zip(prepared.patches_of(number)) {
             let places_m = triangle.map(|corner| part.mesh.vertices[corner as usize].position_m);
-            corners[*sheet as usize].extend(places_m);
+            corners[*patch as usize].extend(places_m);
         }
     }
     corners
@@ -101,13 +101,13 @@ fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
 
 /// Returns the centre of each patch in the world.
 fn middles_m(prepared: &Prepared, corners: &[Vec<Vector>]) -> Vec<Vector> {
-    let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
-        let part = &prepared.scenery.parts[sheet.part as usize];
+    let patches = prepared.patches.iter().zip(corners).map(|(patch, corners_m)| {
+        let part = &prepared.scenery.parts[patch.part as usize];
         debug_assert_eq!(part.carrier, Carrier::Room);
         let pose: Pose = part.carrier_from_mesh;
         pose * (corners_m.iter().sum::<Vector>() / corners_m.len().max(1) as f32)
     });
-    sheets.collect()
+    patches.collect()
 }
 
 /// Fills the texels of a map that are inside an object from adjacent texels, and smooths noise.

@@ -16,7 +16,7 @@ const MAX_SIDE: f32 = 160.0;
 const FLAT_M: f32 = 1e-3;
 
 /// A flat patch in the world.
-pub(super) struct FlatSheet {
+pub(super) struct FlatPatch {
     normal: Vector,
     /// Rectangle around the patch: the directions of its sides, a corner, and the lengths of its sides.
     sides_direction: [Vector; 2],
@@ -24,7 +24,7 @@ pub(super) struct FlatSheet {
     sides_m: [f32; 2],
 }
 
-impl FlatSheet {
+impl FlatPatch {
     /// Returns the rectangle around some points with a common normal, clipped to a box. Returns `None` if
     /// they are not in one plane.
     pub(super) fn of(
@@ -32,7 +32,7 @@ impl FlatSheet {
         normal: Vector,
         world_from_mesh: Pose,
         box_m: [Vector; 2],
-    ) -> Option<FlatSheet> {
+    ) -> Option<FlatPatch> {
         let height_m = normal.dot(*points_m.first()?);
         if points_m.iter().any(|point_m| (normal.dot(*point_m) - height_m).abs() > FLAT_M) {
             return None;
@@ -57,19 +57,19 @@ impl FlatSheet {
         let height_m = normal.dot(world_from_mesh * points_m[0]);
         let corner_m = normal * height_m + along[0] * low_m[0] + along[1] * low_m[1];
         let sides_m = [high_m[0] - low_m[0], high_m[1] - low_m[1]];
-        Some(FlatSheet { normal, sides_direction: along, corner_m, sides_m })
+        Some(FlatPatch { normal, sides_direction: along, corner_m, sides_m })
     }
 
     /// Returns the factor on the usual size of texels at which the maps of a room have few enough texels.
     /// Patches smaller than the growth of a texel become `None`: a mesh may have more triangles than all maps
     /// have texels.
-    pub(super) fn fit(sheets: &mut [Option<FlatSheet>]) -> f32 {
+    pub(super) fn fit(patches: &mut [Option<FlatPatch>]) -> f32 {
         let mut texel_factor = 1.0;
-        while texels(sheets, texel_factor) > MAX_TEXELS && texel_factor < MAX_TEXEL_FACTOR {
+        while texels(patches, texel_factor) > MAX_TEXELS && texel_factor < MAX_TEXEL_FACTOR {
             texel_factor *= TEXEL_GROWTH;
             let min_side_m = TEXEL_M * (texel_factor - 1.0);
-            for sheet in sheets.iter_mut() {
-                sheet.take_if(|sheet| sheet.sides_m[0].max(sheet.sides_m[1]) < min_side_m);
+            for patch in patches.iter_mut() {
+                patch.take_if(|patch| patch.sides_m[0].max(patch.sides_m[1]) < min_side_m);
             }
         }
         texel_factor
@@ -107,8 +107,8 @@ impl FlatSheet {
 }
 
 /// Returns the number of texels in the maps of patches.
-fn texels(sheets: &[Option<FlatSheet>], texel_factor: f32) -> f32 {
-    let maps = sheets.iter().flatten().map(|sheet| sheet.map(0, texel_factor));
+fn texels(patches: &[Option<FlatPatch>], texel_factor: f32) -> f32 {
+    let maps = patches.iter().flatten().map(|patch| patch.map(0, texel_factor));
     maps.map(|map| (map.width * map.height) as f32).sum()
 }
 
@@ -117,33 +117,33 @@ mod tests {
     use super::*;
 
     /// Returns squares with sides of `side_m`.
-    fn squares(count: usize, side_m: f32) -> impl Iterator<Item = Option<FlatSheet>> {
+    fn squares(count: usize, side_m: f32) -> impl Iterator<Item = Option<FlatPatch>> {
         let corners =
             [Vector::ZERO, Vector::X * side_m, Vector::Y * side_m, Vector::new(side_m, side_m, 0.0)];
         let box_m = [Vector::splat(-100.0), Vector::splat(100.0)];
-        (0..count).map(move |_| FlatSheet::of(&corners, Vector::Z, Pose::IDENTITY, box_m))
+        (0..count).map(move |_| FlatPatch::of(&corners, Vector::Z, Pose::IDENTITY, box_m))
     }
 
-    fn count(sheets: &[Option<FlatSheet>]) -> usize {
-        sheets.iter().flatten().count()
+    fn count(patches: &[Option<FlatPatch>]) -> usize {
+        patches.iter().flatten().count()
     }
 
     #[test]
     fn rooms_with_few_texels_keep_all_maps() {
         let mut room: Vec<_> = squares(6, 4.0).chain(squares(500, 0.02)).collect();
-        assert_eq!(FlatSheet::fit(&mut room), 1.0);
+        assert_eq!(FlatPatch::fit(&mut room), 1.0);
         assert_eq!(count(&room), 506);
     }
 
     #[test]
-    fn large_rooms_have_larger_texels_and_small_sheets_have_none() {
+    fn large_rooms_have_larger_texels_and_small_patches_have_none() {
         let mut large: Vec<_> = squares(24, 10.0).collect();
-        let texel_factor = FlatSheet::fit(&mut large);
+        let texel_factor = FlatPatch::fit(&mut large);
         assert!(texel_factor > 1.5 && texels(&large, texel_factor) <= MAX_TEXELS, "{texel_factor}");
         assert_eq!(count(&large), 24);
 
         let mut detailed: Vec<_> = squares(6, 4.0).chain(squares(100_000, 0.02)).collect();
-        let texel_factor = FlatSheet::fit(&mut detailed);
+        let texel_factor = FlatPatch::fit(&mut detailed);
         assert!(texels(&detailed, texel_factor) <= MAX_TEXELS);
         assert_eq!(count(&detailed), 6, "walls keep their maps, triangles do not");
     }

@@ -27,7 +27,7 @@ pub fn lit(scenery: Scenery) -> Arc<Prepared> {
     kept.truncate(MAX_KEPT);
     let mut triangles = 0;
     let mut fits = |(_, prepared): &(Scenery, Arc<Prepared>)| {
-        triangles += prepared.sheet_of.len();
+        triangles += prepared.patch_of.len();
         triangles <= MAX_KEPT_TRIANGLES
     };
     let fitting = kept.iter().take_while(|kept| fits(kept)).count();

@@ -2,19 +2,19 @@
 
 use super::shade::{StripLight, Surfaces};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::baked::{LightCube, SURE_SLOPE, SheetLight, map_light};
+use crate::render::shading::baked::{LightCube, PatchLight, SURE_SLOPE, map_light};
 use crate::render::shading::lanes::{Lanes, axes, lanes};
 use crate::render::{Carrier, PlacedScenery};
 
 impl<'a> StripLight<'a> {
     /// Returns the light source of a patch; `cubes` are the ambient cubes of the parts.
     #[inline(always)]
-    pub(super) fn of(prepared: &'a Prepared, cubes: &'a [LightCube], sheet: u32) -> StripLight<'a> {
+    pub(super) fn of(prepared: &'a Prepared, cubes: &'a [LightCube], patch: u32) -> StripLight<'a> {
         let Some(baked) = &prepared.baked else { return StripLight::Plain };
-        match baked.sheets.get(sheet as usize) {
-            Some(SheetLight::Map(number)) => StripLight::Map(&baked.maps[*number as usize], &baked.texels),
-            Some(SheetLight::Cube(number)) => StripLight::Cube(&baked.cubes[*number as usize]),
-            None => StripLight::Cube(&cubes[prepared.sheets[sheet as usize].part as usize]),
+        match baked.patches.get(patch as usize) {
+            Some(PatchLight::Map(number)) => StripLight::Map(&baked.maps[*number as usize], &baked.texels),
+            Some(PatchLight::Cube(number)) => StripLight::Cube(&baked.cubes[*number as usize]),
+            None => StripLight::Cube(&cubes[prepared.patches[patch as usize].part as usize]),
         }
     }
 }

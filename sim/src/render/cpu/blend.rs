@@ -32,29 +32,29 @@ impl View<'_> {
     /// Shades a row of pixels of one layer.
     #[inline(always)]
     fn veil(&self, layer: &RenderTarget, y: usize, width: usize, row: &mut Row) {
-        let rows: [&[u32]; SAMPLES] = std::array::from_fn(|i| layer.sheets(y * SAMPLES + i));
+        let rows: [&[u32]; SAMPLES] = std::array::from_fn(|i| layer.patches(y * SAMPLES + i));
         for x in 0..width {
             let seen: [u32; PER_PIXEL] =
                 std::array::from_fn(|i| rows[i / SAMPLES][x * SAMPLES + i % SAMPLES]);
             if row.surfaces.room() < PER_PIXEL {
                 self.shade_veils(row);
             }
-            for (i, sheet) in seen.iter().enumerate() {
-                if *sheet == NOTHING || seen[..i].contains(sheet) {
+            for (i, patch) in seen.iter().enumerate() {
+                if *patch == NOTHING || seen[..i].contains(patch) {
                     continue;
                 }
-                let covered = seen[i..].iter().filter(|other| *other == sheet).count();
-                let part = self.prepared.sheets[*sheet as usize].part as usize;
+                let covered = seen[i..].iter().filter(|other| *other == patch).count();
+                let part = self.prepared.patches[*patch as usize].part as usize;
                 let sample = [x * SAMPLES + i % SAMPLES, y * SAMPLES + i / SAMPLES];
                 let strip = Strip {
-                    facet: &self.facets[*sheet as usize],
+                    facet: &self.facets[*patch as usize],
                     image: self.prepared.images[part].as_ref(),
                     sample,
                     nearness_1_m: &layer.nearness_1_m(sample[1])[sample[0]..],
                     first_pixel: x,
                     count: 1,
                     share: covered as f32 / PER_PIXEL as f32,
-                    light: StripLight::of(self.prepared, self.cubes, *sheet),
+                    light: StripLight::of(self.prepared, self.cubes, *patch),
                     alpha: Some(self.prepared.scenery.parts[part].alpha),
                     has_lamps: self.lamps.is_some(),
                     has_layers: self.prepared.has_layers,

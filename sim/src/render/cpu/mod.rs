@@ -218,7 +218,7 @@ impl WithSimd for PictureDrawing<'_> {
         for row in 0..camera.height as usize {
             centres.finish_row(row);
             frame.depth_m.extend(centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
-            frame.ids.extend(centres.sheets(row).iter().map(|sheet| prepared.id(*sheet)));
+            frame.ids.extend(centres.patches(row).iter().map(|patch| prepared.id(*patch)));
         }
         if prepared.scenery.parts.iter().any(Part::is_cut_out) {
             veils_at_centres.draw(simd, centres, prepared, &state.placed, camera);

@@ -7,7 +7,7 @@ use super::contact::ContactMap;
 use super::raster::Rays;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
-use crate::render::scene::prepared::{Prepared, Sheet};
+use crate::render::scene::prepared::{Patch, Prepared};
 use crate::render::shading::baked::{LightCube, LightMap, LightTexel};
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
@@ -163,20 +163,20 @@ pub(super) fn place(
     placed: &PlacedScenery,
     before: &PlacedScenery,
 ) {
-    facets.resize(prepared.sheets.len(), Facet::default());
+    facets.resize(prepared.patches.len(), Facet::default());
     let mut rest = facets.as_mut_slice();
-    for sheets in prepared.sheets.chunk_by(|one, next| one.part == next.part) {
-        let (facets, others) = std::mem::take(&mut rest).split_at_mut(sheets.len());
+    for patches in prepared.patches.chunk_by(|one, next| one.part == next.part) {
+        let (facets, others) = std::mem::take(&mut rest).split_at_mut(patches.len());
         rest = others;
-        let number = sheets[0].part as usize;
+        let number = patches[0].part as usize;
         if before.world_from_mesh.get(number) != Some(&placed.world_from_mesh[number]) {
-            place_part(facets, sheets, prepared, number, placed.world_from_mesh[number]);
+            place_part(facets, patches, prepared, number, placed.world_from_mesh[number]);
         }
     }
 }
 
 /// Updates the facets of a part with these patches.
-fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
+fn place_part(facets: &mut [Facet], patches: &[Patch], prepared: &Prepared, number: usize, pose: Pose) {
     let part = &prepared.scenery.parts[number];
     let rotation = Matrix::from_quat(pose.rotation);
     let common = Facet {
@@ -188,11 +188,11 @@ fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, numbe
         pattern_from_world: prepared.pattern_from_world(number, pose),
         carries: part.carrier == Carrier::Room,
     };
-    for (facet, sheet) in facets.iter_mut().zip(sheets) {
-        let slope_1_m = sheet.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
+    for (facet, patch) in facets.iter_mut().zip(patches) {
+        let slope_1_m = patch.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
         let at_origin = slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * pose.translation);
-        *facet = Facet { normal: rotation * sheet.bend.normal - at_origin, slope_1_m, ..common };
-        if let Some(uv) = sheet.uv {
+        *facet = Facet { normal: rotation * patch.bend.normal - at_origin, slope_1_m, ..common };
+        if let Some(uv) = patch.uv {
             facet.pattern_from_world = uv.affine().after(pose.inverse());
         }
     }

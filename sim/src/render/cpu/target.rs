@@ -15,7 +15,7 @@ use crate::render::{Camera, PlacedScenery};
 pub(super) struct RenderTarget {
     grid: Grid,
     nearness_1_m: SampleRows<f32>,
-    sheet: SampleRows<u32>,
+    patch: SampleRows<u32>,
 }
 
 /// Draws the camera's view into `samples`, with [`SAMPLES`] per pixel along each axis, and into `centres`, if
@@ -120,15 +120,15 @@ fn project(
             let row = lanes(|i| cy - y[i] * focal * nearness[i]);
             [column, row, nearness, z]
         });
-        let (sheets, triangles) = (prepared.sheets_of(number), &geometry.triangles);
+        let (patches, triangles) = (prepared.patches_of(number), &geometry.triangles);
         let eye_m = camera_from_mesh.inverse().translation;
         geometry.faces.put_front(&mut front, [eye_m.x, eye_m.y, eye_m.z, 1.0]);
         for number in &front {
-            let (sheet, triangle) = (sheets[*number as usize], triangles[*number as usize]);
+            let (patch, triangle) = (patches[*number as usize], triangles[*number as usize]);
             let [a, b, c] = triangle.map(|corner| corners[corner as usize]);
             let visible = [a, b, c].map(|[_, _, _, z]| u32::from(z < -NEAR_M)).into_iter().sum::<u32>();
             if visible == 3 {
-                batch.push([a, b, c].map(|[u, v, nearness, _]| [u, v, nearness]), sheet);
+                batch.push([a, b, c].map(|[u, v, nearness, _]| [u, v, nearness]), patch);
             } else if visible > 0 {
                 let corners_m = part.mesh.triangles[*number as usize]
                     .map(|corner| map.map(part.mesh.vertices[corner as usize].position_m));
@@ -138,7 +138,7 @@ fn project(
                     if batch.is_full() {
                         each(&batch.take());
                     }
-                    batch.push(corners.map(|p| lens.screen(p.to_array())), sheet);
+                    batch.push(corners.map(|p| lens.screen(p.to_array())), patch);
                 }
             }
             if batch.is_full() {
@@ -210,14 +210,14 @@ impl RenderTarget {
 
     /// Returns the patch indices that a finished row shows.
     #[inline(always)]
-    pub(super) fn sheets(&self, row: usize) -> &[u32] {
-        self.sheet.row(row)
+    pub(super) fn patches(&self, row: usize) -> &[u32] {
+        self.patch.row(row)
     }
 
     fn reset(&mut self, grid: Grid) {
         self.grid = grid;
         self.nearness_1_m.reset(grid, 0.0);
-        self.sheet.fit(grid, NOTHING);
+        self.patch.fit(grid, NOTHING);
     }
 
     /// Clears the patch indices of a row where nothing was drawn, which still hold values of other images.
@@ -226,8 +226,8 @@ impl RenderTarget {
     pub(super) fn finish_row(&mut self, row: usize) {
         let nearness_1_m = self.nearness_1_m.row(row);
         if nearness_1_m.iter().fold(false, |any, nearness| any | (*nearness == 0.0)) {
-            for (sheet, nearness) in self.sheet.row_mut(row).iter_mut().zip(nearness_1_m) {
-                *sheet = if *nearness == 0.0 { NOTHING } else { *sheet };
+            for (patch, nearness) in self.patch.row_mut(row).iter_mut().zip(nearness_1_m) {
+                *patch = if *nearness == 0.0 { NOTHING } else { *patch };
             }
         }
     }
@@ -236,18 +236,18 @@ impl RenderTarget {
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, outlines: &Outlines) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
-        let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
+        let owner = S::as_mut_simd_u32s(self.patch.all_mut()).0;
         let nothing = simd.splat_u32s(0);
         outlines.draw(
             simd,
             self.grid,
             #[inline(always)]
-            |i, sheet, nearness| {
+            |i, patch, nearness| {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.max_f32s(nearness, nearest[i]);
                 // A selection would be compiled to a masked store, which takes some processors 20 ns.
                 let change =
-                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
+                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(patch)), nothing);
                 owner[i] = simd.xor_u32s(owner[i], change);
             },
         );
@@ -264,7 +264,7 @@ impl RenderTarget {
         before: Option<&RenderTarget>,
     ) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
-        let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
+        let owner = S::as_mut_simd_u32s(self.patch.all_mut()).0;
         let behind = S::as_simd_f32s(solid.nearness_1_m.all()).0;
         let front = before.map(|before| S::as_simd_f32s(before.nearness_1_m.all()).0);
         let (nothing, none) = (simd.splat_u32s(0), simd.splat_f32s(0.0));
@@ -272,7 +272,7 @@ impl RenderTarget {
             simd,
             self.grid,
             #[inline(always)]
-            |i, sheet, nearness| {
+            |i, patch, nearness| {
                 let in_front = simd.greater_than_f32s(nearness, behind[i]);
                 let mut nearness = simd.select_f32s(in_front, nearness, none);
                 if let Some(front) = front {
@@ -281,7 +281,7 @@ impl RenderTarget {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.max_f32s(nearness, nearest[i]);
                 let change =
-                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
+                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(patch)), nothing);
                 owner[i] = simd.xor_u32s(owner[i], change);
             },
         );

@@ -55,9 +55,9 @@ impl Veils {
         let width = frame.width as usize;
         for layer in self.farthest_first() {
             for row in 0..layer.height() {
-                let sheets = layer.sheets(row).iter().zip(layer.nearness_1_m(row));
-                for (column, (sheet, nearness_1_m)) in sheets.enumerate() {
-                    let Some(part) = prepared.sheets.get(*sheet as usize).map(|sheet| sheet.part as usize)
+                let patches = layer.patches(row).iter().zip(layer.nearness_1_m(row));
+                for (column, (patch, nearness_1_m)) in patches.enumerate() {
+                    let Some(part) = prepared.patches.get(*patch as usize).map(|patch| patch.part as usize)
                     else {
                         continue;
                     };
@@ -66,12 +66,12 @@ impl Veils {
                     }
                     let point_m = rays.point_m([column, row], *nearness_1_m);
                     let alpha = prepared.images[part].as_ref().map_or(1.0, |image| {
-                        let at = facets[*sheet as usize].pattern_from_world.map(point_m);
+                        let at = facets[*patch as usize].pattern_from_world.map(point_m);
                         image.rgb_and_alpha(&image.place(at, [0.0; 3], [0.0; 3])).1
                     });
                     if alpha >= MIN_SEEN_ALPHA {
                         frame.depth_m[row * width + column] = 1.0 / nearness_1_m;
-                        frame.ids[row * width + column] = prepared.id(*sheet);
+                        frame.ids[row * width + column] = prepared.id(*patch);
                     }
                 }
             }

@@ -82,7 +82,7 @@ impl View<'_> {
     fn row(&self, y: usize, width: usize, row: &mut Row) {
         let last = self.target.height() - 1;
         let rows: [&[u32]; SAMPLES + 1] =
-            std::array::from_fn(|i| self.target.sheets((y * SAMPLES + i).min(last)));
+            std::array::from_fn(|i| self.target.patches((y * SAMPLES + i).min(last)));
         mark_edges(rows, &mut row.edges);
         row.mixed.resize(width, 0);
         for (mixed, [left, right]) in row.mixed.iter_mut().zip(row.edges.as_chunks::<SAMPLES>().0) {
@@ -123,8 +123,8 @@ impl View<'_> {
     /// Adds a patch to adjacent pixels that it covers, or covers by a share. `sample` is the sample of the
     /// first pixel.
     #[inline(always)]
-    fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
-        if let (NOTHING, Some(sky)) = (sheet, &self.prepared.sky) {
+    fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], patch: u32, share: f32) {
+        if let (NOTHING, Some(sky)) = (patch, &self.prepared.sky) {
             for (across, x) in pixels.enumerate() {
                 let (ray, steps) = self.rays.sample([sample[0] + across * SAMPLES, sample[1]]);
                 let rgb = sky.sky_rgb(ray, steps) * share;
@@ -132,15 +132,15 @@ impl View<'_> {
             }
             return;
         }
-        if sheet == NOTHING {
+        if patch == NOTHING {
             for (sum, sky) in row.sum_rgb.iter_mut().zip(SKY.to_array()) {
                 sum[pixels.clone()].iter_mut().for_each(|sum| *sum += sky * share);
             }
             return;
         }
-        let part = self.prepared.sheets[sheet as usize].part;
+        let part = self.prepared.patches[patch as usize].part;
         let strip = Strip {
-            facet: &self.facets[sheet as usize],
+            facet: &self.facets[patch as usize],
             image: self.prepared.images[part as usize].as_ref(),
             sample,
             nearness_1_m: &self.target.nearness_1_m(sample[1])[sample[0]..],
@@ -148,7 +148,7 @@ impl View<'_> {
             count: pixels.len(),
             share,
             alpha: None,
-            light: StripLight::of(self.prepared, self.cubes, sheet),
+            light: StripLight::of(self.prepared, self.cubes, patch),
             has_lamps: self.lamps.is_some(),
             has_layers: self.prepared.has_layers,
         };
@@ -171,19 +171,19 @@ impl View<'_> {
             self.outlines(y, columns, &seen, &ids)
         };
         let share = 1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
-        let sheets = [seen[0][0], seen[0][1], seen[1][0], seen[1][1]];
-        for (i, sheet) in sheets.iter().enumerate() {
-            if !sheets[..i].contains(sheet) {
-                let covered = sheets[i..].iter().filter(|other| *other == sheet).count();
+        let patches = [seen[0][0], seen[0][1], seen[1][0], seen[1][1]];
+        for (i, patch) in patches.iter().enumerate() {
+            if !patches[..i].contains(patch) {
+                let covered = patches[i..].iter().filter(|other| *other == patch).count();
                 let sample = [sx + i % SAMPLES, y * SAMPLES + i / SAMPLES];
-                self.show(row, x..x + 1, sample, *sheet, share * covered as f32 / PER_PIXEL as f32);
+                self.show(row, x..x + 1, sample, *patch, share * covered as f32 / PER_PIXEL as f32);
             }
         }
     }
 
     #[inline(always)]
-    fn ids(&self, sheets: &[u32; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
-        let [a, b, c] = *sheets;
+    fn ids(&self, patches: &[u32; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
+        let [a, b, c] = *patches;
         [self.prepared.id(a), self.prepared.id(b), self.prepared.id(c)]
     }
 

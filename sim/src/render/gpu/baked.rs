@@ -1,7 +1,7 @@
 //! Baked light in GPU memory: ambient cubes of parts and of the room, and the texels of its light maps.
 
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::baked::{BakedLight, LightCube, LightTexel, SheetLight};
+use crate::render::shading::baked::{BakedLight, LightCube, LightTexel, PatchLight};
 use crate::render::{Carrier, PlacedScenery};
 
 /// Number of words about light in `Face`.
@@ -23,18 +23,18 @@ pub(super) fn numbers(prepared: &Prepared) -> Vec<LightTexel> {
 }
 
 /// Returns the words of `Face` about the light of a patch.
-pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBERS] {
+pub(super) fn face_numbers(prepared: &Prepared, patch: u32) -> [u32; FACE_NUMBERS] {
     let mut numbers = [0; FACE_NUMBERS];
     let Some(baked) = &prepared.baked else { return numbers };
     let first_cube = prepared.scenery.parts.len() as u32 * SIDES;
-    let light = match baked.sheets.get(sheet as usize) {
-        Some(SheetLight::Map(number)) => {
+    let light = match baked.patches.get(patch as usize) {
+        Some(PatchLight::Map(number)) => {
             let map = &baked.maps[*number as usize];
             numbers[..8].copy_from_slice(map.axes_values.map(|row| row.map(f32::to_bits)).as_flattened());
             let first_texel = first_cube + baked.cubes.len() as u32 * SIDES;
             [ON_MAP, first_texel + map.first, map.width, map.height]
         }
-        Some(SheetLight::Cube(number)) => [ON_CUBE, first_cube + number * SIDES, 0, 0],
+        Some(PatchLight::Cube(number)) => [ON_CUBE, first_cube + number * SIDES, 0, 0],
         None => [ON_PART, 0, 0, 0],
     };
     numbers[8..].copy_from_slice(&light);

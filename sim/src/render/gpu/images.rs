@@ -106,11 +106,11 @@ fn coordinates(prepared: &Prepared) -> Vec<[u32; COORDINATE_NUMBERS]> {
     if prepared.images.iter().all(Option::is_none) {
         return Vec::new();
     }
-    let mut found = Vec::with_capacity(prepared.sheet_of.len());
+    let mut found = Vec::with_capacity(prepared.patch_of.len());
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
         let of_part = prepared.images[number].as_ref().and_then(|image| image.from_mesh);
-        for (corners, sheet) in part.mesh.triangles.iter().zip(prepared.sheets_of(number)) {
-            let uv = prepared.sheets[*sheet as usize].uv;
+        for (corners, patch) in part.mesh.triangles.iter().zip(prepared.patches_of(number)) {
+            let uv = prepared.patches[*patch as usize].uv;
             let Affine(rows) = uv.map(|uv| uv.affine()).or(of_part).unwrap_or_default();
             let corner_m: Vector = part.mesh.vertices[corners[0] as usize].position_m;
             let mut numbers = [0; COORDINATE_NUMBERS];

@@ -60,11 +60,11 @@ impl SceneBuffers {
         let parts = prepared.scenery.parts.iter();
         let corners: Vec<[u32; 4]> =
             parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
-        let triangles = prepared.sheet_of.iter().zip(corners.iter().step_by(3));
+        let triangles = prepared.patch_of.iter().zip(corners.iter().step_by(3));
         let faces: Vec<u32> = triangles
-            .flat_map(|(sheet, corner)| {
-                let bend = face(prepared.sheets[*sheet as usize].bend, *corner);
-                bend.into_iter().chain(baked::face_numbers(prepared, *sheet))
+            .flat_map(|(patch, corner)| {
+                let bend = face(prepared.patches[*patch as usize].bend, *corner);
+                bend.into_iter().chain(baked::face_numbers(prepared, *patch))
             })
             .collect();
         let images = SceneImages::of(prepared, gpu.device.limits().max_storage_buffer_binding_size);

@@ -6,9 +6,9 @@ pub mod faces;
 mod hidden;
 pub mod lens;
 pub mod mesh;
+pub mod patches;
 pub mod prepared;
 pub mod shared;
-pub mod sheets;
 mod smooth;
 mod visible;
 

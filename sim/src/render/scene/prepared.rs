@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Vector};
 
 use super::bend::Bend;
+use super::patches::{MeshPatch, UvMap};
 use super::shared::MeshGeometry;
-use super::sheets::{MeshSheet, UvMap};
 use crate::render::shading::baked::BakedLight;
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::Affine;
@@ -24,7 +24,7 @@ pub struct Prepared {
     pub scenery: Scenery,
     /// Baked light of the room, for rasterisers. `None` if a sun or the lights of a file light the scenery.
     pub baked: Option<Arc<BakedLight>>,
-    pub sheets: Vec<Sheet>,
+    pub patches: Vec<Patch>,
     /// The image of each part.
     pub images: Vec<Option<Image>>,
     /// True if layers of images change ambient light or emit light.
@@ -34,7 +34,7 @@ pub struct Prepared {
     /// Image of the sky.
     pub sky: Option<Image>,
     /// Index of each triangle's patch, with triangles counted part by part.
-    pub sheet_of: Vec<u32>,
+    pub patch_of: Vec<u32>,
     /// Index of the first triangle of each part.
     first: Vec<usize>,
     /// Id of each patch in images.
@@ -47,7 +47,7 @@ pub struct Prepared {
 
 /// Patch: adjacent triangles of a part that share one shading formula.
 #[derive(Clone, Copy)]
-pub struct Sheet {
+pub struct Patch {
     pub part: u32,
     pub bend: Bend,
     /// `None` without texture coordinates.
@@ -57,27 +57,27 @@ pub struct Sheet {
 impl Prepared {
     /// Prepares a scenery without baked light.
     pub fn new(scenery: Scenery) -> Prepared {
-        let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut patches, mut patch_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
         for (part, number) in scenery.parts.iter().zip(0..) {
-            first.push(sheet_of.len());
+            first.push(patch_of.len());
             let geometry = part.mesh.geometry();
-            let first_sheet = sheets.len() as u32;
-            sheet_of.extend(geometry.sheet_of.iter().map(|sheet| first_sheet + sheet));
-            let sheet = |MeshSheet { bend, uv }: &MeshSheet| Sheet { part: number, bend: *bend, uv: *uv };
-            sheets.extend(geometry.sheets.iter().map(sheet));
+            let first_patch = patches.len() as u32;
+            patch_of.extend(geometry.patch_of.iter().map(|patch| first_patch + patch));
+            let patch = |MeshPatch { bend, uv }: &MeshPatch| Patch { part: number, bend: *bend, uv: *uv };
+            patches.extend(geometry.patches.iter().map(patch));
         }
-        first.push(sheet_of.len());
+        first.push(patch_of.len());
         let images: Vec<_> = scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect();
-        let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
+        let id = |patch: &Patch| scenery.parts[patch.part as usize].id;
         Prepared {
-            ids: sheets.iter().map(id).collect(),
+            ids: patches.iter().map(id).collect(),
             baked: None,
-            sheets,
+            patches,
             has_layers: images.iter().flatten().any(Image::changes_light),
             images,
             is_veil: scenery.parts.iter().map(Part::is_veil).collect(),
             sky: scenery.sky.as_ref().map(Image::around),
-            sheet_of,
+            patch_of,
             first,
             linear_rgb: scenery.parts.iter().map(colours).collect(),
             grain: scenery.parts.iter().map(grain).collect(),
@@ -106,15 +106,15 @@ impl Prepared {
     }
 
     /// Returns the patch indices of a part's triangles.
-    pub fn sheets_of(&self, part: usize) -> &[u32] {
-        &self.sheet_of[self.first[part]..self.first[part + 1]]
+    pub fn patches_of(&self, part: usize) -> &[u32] {
+        &self.patch_of[self.first[part]..self.first[part + 1]]
     }
 
     /// Returns the id of a patch in images.
     #[inline(always)]
-    pub fn id(&self, sheet: u32) -> u32 {
+    pub fn id(&self, patch: u32) -> u32 {
         // No patch has the index [`NOTHING`].
-        self.ids.get(sheet as usize).copied().unwrap_or(0)
+        self.ids.get(patch as usize).copied().unwrap_or(0)
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use rapier3d::math::Vector;
 
 use super::faces::Faces;
-use super::sheets::MeshSheet;
+use super::patches::MeshPatch;
 use crate::render::TriangleMesh;
 use crate::render::shading::lanes::Points;
 
@@ -30,9 +30,9 @@ pub struct MeshGeometry {
     pub triangles: Vec<[u32; 3]>,
     /// Planes of the triangles.
     pub faces: Faces,
-    pub sheets: Vec<MeshSheet>,
+    pub patches: Vec<MeshPatch>,
     /// Index of each triangle's patch.
-    pub sheet_of: Vec<u32>,
+    pub patch_of: Vec<u32>,
     /// Centre and radius of a sphere around the mesh.
     pub bounds: (Vector, f32),
     /// Index of the longest axis of the mesh.
@@ -68,14 +68,14 @@ impl PartialEq for SharedMesh {
 
 impl MeshGeometry {
     fn of(mesh: &TriangleMesh) -> MeshGeometry {
-        let (sheets, sheet_of) = mesh.sheets();
+        let (patches, patch_of) = mesh.patches();
         let (points, triangles) = joined(mesh);
         MeshGeometry {
             points,
             triangles,
             faces: Faces::of(mesh),
-            sheets,
-            sheet_of,
+            patches,
+            patch_of,
             bounds: mesh.bounds(),
             longest_axis: mesh.longest_axis(),
         }

@@ -28,7 +28,7 @@ pub type LightCube = [LightTexel; 6];
 #[derive(Debug, Serialize, Deserialize)]
 pub struct BakedLight {
     /// Light of each patch of the room, by the patches' indices.
-    pub sheets: Vec<SheetLight>,
+    pub patches: Vec<PatchLight>,
     pub maps: Vec<LightMap>,
     /// Texels of all maps, map by map and row by row.
     pub texels: Vec<LightTexel>,
@@ -62,7 +62,7 @@ pub struct SurfacePoint {
 
 /// Source of the light of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SheetLight {
+pub enum PatchLight {
     /// Index of its light map.
     Map(u32),
     /// Index of its ambient cube.
@@ -76,11 +76,11 @@ impl BakedLight {
             let end = u64::from(map.first) + u64::from(map.width) * u64::from(map.height);
             map.width >= 2 && map.height >= 2 && end <= self.texels.len() as u64
         };
-        let is_lit = |sheet: &SheetLight| match sheet {
-            SheetLight::Map(number) => (*number as usize) < self.maps.len(),
-            SheetLight::Cube(number) => (*number as usize) < self.cubes.len(),
+        let is_lit = |patch: &PatchLight| match patch {
+            PatchLight::Map(number) => (*number as usize) < self.maps.len(),
+            PatchLight::Cube(number) => (*number as usize) < self.cubes.len(),
         };
-        self.maps.iter().all(is_map) && self.sheets.iter().all(is_lit) && self.probes.are_whole()
+        self.maps.iter().all(is_map) && self.patches.iter().all(is_lit) && self.probes.are_whole()
     }
 
     /// Returns the ambient cube at a point in the room.

@@ -8,7 +8,7 @@ use crate::render::{TriangleMesh, Vertex};
 
 /// Patch of a mesh, in the mesh's frame.
 #[derive(Clone, Copy, Debug)]
-pub struct MeshSheet {
+pub struct MeshPatch {
     pub bend: Bend,
     /// `None` without texture coordinates.
     pub uv: Option<UvMap>,
@@ -25,24 +25,24 @@ const TRIED: usize = 8;
 
 impl TriangleMesh {
     /// Returns the patches of the mesh, and for each triangle the index of its patch.
-    pub(in crate::render) fn sheets(&self) -> (Vec<MeshSheet>, Vec<u32>) {
+    pub(in crate::render) fn patches(&self) -> (Vec<MeshPatch>, Vec<u32>) {
         let (bends, bend_of) = self.bends();
         if self.vertices.iter().all(|vertex| vertex.uv == [0.0; 2]) {
-            return (bends.into_iter().map(|bend| MeshSheet { bend, uv: None }).collect(), bend_of);
+            return (bends.into_iter().map(|bend| MeshPatch { bend, uv: None }).collect(), bend_of);
         }
-        let (mut sheets, mut of_bend): (Vec<(u32, UvMap)>, _) = (Vec::new(), Vec::new());
+        let (mut patches, mut of_bend): (Vec<(u32, UvMap)>, _) = (Vec::new(), Vec::new());
         for (corners, bend) in self.triangles.iter().zip(&bend_of) {
             let corners = corners.map(|corner| self.vertices[corner as usize]);
             let fits = |(other, map): &(u32, UvMap)| other == bend && map.fits(&corners);
-            let latest = sheets.len().saturating_sub(TRIED);
-            let found = sheets[latest..].iter().rposition(fits).map(|index| latest + index);
-            of_bend.push(found.unwrap_or(sheets.len()) as u32);
+            let latest = patches.len().saturating_sub(TRIED);
+            let found = patches[latest..].iter().rposition(fits).map(|index| latest + index);
+            of_bend.push(found.unwrap_or(patches.len()) as u32);
             if found.is_none() {
-                sheets.push((*bend, UvMap::between(&corners)));
+                patches.push((*bend, UvMap::between(&corners)));
             }
         }
-        let sheet = |(bend, map): (u32, UvMap)| MeshSheet { bend: bends[bend as usize], uv: Some(map) };
-        (sheets.into_iter().map(sheet).collect(), of_bend)
+        let patch = |(bend, map): (u32, UvMap)| MeshPatch { bend: bends[bend as usize], uv: Some(map) };
+        (patches.into_iter().map(patch).collect(), of_bend)
     }
 }
 
@@ -92,16 +92,16 @@ mod tests {
     }
 
     #[test]
-    fn triangles_with_one_map_are_one_sheet_and_those_with_two_are_two() {
+    fn triangles_with_one_map_are_one_patch_and_those_with_two_are_two() {
         let whole = square([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
-        let (sheets, sheet_of) = whole.sheets();
-        assert_eq!(sheet_of, [0, 0]);
-        let [u, v] = sheets[0].uv.expect("a map").0.map(|(along, constant)| (along.to_array(), constant));
+        let (patches, patch_of) = whole.patches();
+        assert_eq!(patch_of, [0, 0]);
+        let [u, v] = patches[0].uv.expect("a map").0.map(|(along, constant)| (along.to_array(), constant));
         assert_eq!((u, v), (([0.5, 0.0, 0.0], 0.0), ([0.0, -0.5, 0.0], 1.0)));
 
         let torn = square([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.5]]);
-        assert_eq!(torn.sheets().1, [0, 1]);
-        let plain = torn.without_uvs().sheets();
+        assert_eq!(torn.patches().1, [0, 1]);
+        let plain = torn.without_uvs().patches();
         assert_eq!((plain.0.len(), plain.1), (1, vec![0, 0]));
         assert!(plain.0[0].uv.is_none());
     }
