@@ -116,7 +116,8 @@ fn shells_manuals_and_programs_are_told_what_there_is() {
 
 #[test]
 fn readers_that_have_read_enough_are_no_failure() {
-    for args in [&["tasks"][..], &["tasks", "--json"], &["man"], &["completions", "bash"]] {
+    let bench = ["locomotion", "bench", "--cases", "stand_1kg", "--seeds", "0"];
+    for args in [&["tasks"][..], &["tasks", "--json"], &["man"], &["completions", "bash"], &bench] {
         let program = Command::new(env!("CARGO_BIN_EXE_tandem"))
             .args(args)
             .stdout(Stdio::piped())
