@@ -1,7 +1,7 @@
 """Comparison with MuJoCo on MJCF files of other projects: which are read, directly or imported, and their motion in one second.
 
     python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/worlds/worlds.txt
-    cargo build --release --package tandem-sim --example settle
+    cargo build --release --workspace --example settle
     /tmp/peers/bin/python tests/peers/worlds/worlds.py fetch /tmp/packages
     /tmp/peers/bin/python tests/peers/worlds/worlds.py compare /tmp/packages --tsv /tmp/worlds.tsv
 

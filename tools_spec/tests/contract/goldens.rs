@@ -1,6 +1,6 @@
 //! Golden files of the contract as its callers see it. A change of the contract shows as a change of a file.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract goldens` rewrites them.
+//! `UPDATE_EXPECT=1 cargo test --workspace --release --test contract goldens` rewrites them.
 
 use std::{env, fs, path::Path};
 

@@ -1,6 +1,6 @@
 //! Goldens of all refusals as callers receive them, so that changes of code show as changes of responses.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release -p tandem --lib goldens` rewrites the file.
+//! `UPDATE_EXPECT=1 cargo test --workspace --release --lib goldens` rewrites the file.
 
 use std::{env, fs, io, path::Path, sync::Arc, time::Duration};
 

@@ -1,7 +1,7 @@
 //! The tools as typed Python in `gateway/python/tandem/contract`: classes of arguments and replies, and a
 //! method for each tool.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract python` rewrites them.
+//! `UPDATE_EXPECT=1 cargo test --workspace --release --test contract python` rewrites them.
 
 mod classes;
 mod text;
