@@ -31,7 +31,7 @@ pub struct AppState {
     pub settings: Arc<Settings>,
     /// Key that watchers need.
     pub watch_key: WatchKey,
-    /// Places for watchers.
+    /// Limit on the number of watchers.
     pub watchers: Arc<Semaphore>,
     /// Reader of recordings for watchers.
     pub recordings: RecordingReader,
@@ -79,7 +79,7 @@ impl AppState {
             false => tool_specs(self.wording(caller)),
         };
         if let Caller::Operator { .. } = caller {
-            // An operator's episode goes on already, and no other can be begun.
+            // An operator's episode is already running, and an operator cannot start another.
             specs.retain(|spec| spec.on_episode);
         }
         specs
@@ -110,8 +110,8 @@ fn known(name: &str) -> Option<&'static str> {
     every_tool().into_iter().find(|tool| *tool == name)
 }
 
-/// Returns the names of all tools: those without an episode, those of every episode, and those that only
-/// some episodes have.
+/// Returns the names of all tools: those that need no episode, those of every episode, and those of only some
+/// episodes.
 pub fn every_tool() -> Vec<&'static str> {
     [ListTasks::NAME, StartEpisode::NAME].into_iter().chain(EPISODE_TOOLS.iter().copied()).collect()
 }

@@ -57,7 +57,7 @@ impl Encoding {
         Encoding { body, reply }
     }
 
-    /// Parses a body. An empty one is an object without fields.
+    /// Parses a body. An empty body is an object without fields.
     pub fn read(self, body: &[u8]) -> Result<Value, ApiError> {
         match self.body {
             BodyFormat::Json => json_object(body),

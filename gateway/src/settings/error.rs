@@ -45,7 +45,7 @@ pub enum SettingsError {
         /// Example of a valid number.
         example: &'static str,
     },
-    /// A stress level is given without a stress axis.
+    /// A stress level is given without a kind of stress.
     #[error(
         "a level says how much of what goes wrong; give stress, too, for example camera, or leave level out"
     )]
@@ -53,7 +53,7 @@ pub enum SettingsError {
     /// Two settings change the wording of tasks.
     #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
     TwoWordings,
-    /// A live view of recordings that are readable only after their episodes.
+    /// A live view is requested, but recordings are readable only after their episodes.
     #[error("foxglove shows recordings during episodes, and record is \"after\"; leave one of them out")]
     LiveAfter,
     /// An allowed host is not a host name.

@@ -19,7 +19,7 @@ pub const BRIEF_FILE: &str = "brief.txt";
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 
-/// Time that a process group has to end after the request to terminate.
+/// Time that a process group has to end after it is asked to terminate.
 const TERMINATION_GRACE: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -47,8 +47,8 @@ pub struct ProcessGroup {
 }
 
 impl ProcessGroup {
-    /// Starts `command` in a shell, with the brief in `folder` on its standard input and its output kept
-    /// there.
+    /// Starts `command` in a shell. The brief in `folder` is its standard input, and its output is kept in
+    /// `folder`.
     pub fn start(
         groups: &Arc<ProcessGroups>,
         command: &str,
@@ -160,7 +160,7 @@ pub fn end_all_programs() {
 /// Releases the guard of a group that has ended.
 fn dismiss(mut guard: Child) {
     if let Some(mut stdin) = guard.stdin.take() {
-        // It may have been killed.
+        // The guard may have been killed.
         let _ = stdin.write_all(b"ended\n");
     }
     let _ = guard.wait();
@@ -223,7 +223,7 @@ mod system {
 
     fn signal(id: u32, signal: Signal) {
         if let Some(pid) = number(id) {
-            // The call fails if no process of the group is left, which is fine.
+            // The call fails if the group has no process left, which is not an error here.
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -267,7 +267,7 @@ mod system {
         let _ = child.kill();
     }
 
-    /// Kills a process that runs, and all that it has started.
+    /// Kills a running process and all processes that it has started.
     pub fn kill_group(id: u32) {
         let mut kill = Command::new("taskkill");
         kill.args(["/T", "/F", "/PID", &id.to_string()]);

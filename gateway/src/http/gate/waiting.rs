@@ -45,7 +45,7 @@ struct WaitingEntry {
     crowding: Arc<Crowding>,
 }
 
-/// Tells a connection that it has to close.
+/// Signal to a connection that it must close.
 #[derive(Debug, Default)]
 struct Crowding {
     is_out: AtomicBool,
@@ -92,9 +92,9 @@ impl WaitingConnections {
         }
     }
 
-    /// Adds a connection. A connection that already waits keeps its place, and one that has to close gets no
-    /// place. If its address has too many, the one with the longest wait is closed, preferably one without a
-    /// valid call.
+    /// Adds a connection, unless it has to close. A connection that already waits keeps its position. If too
+    /// many connections of its address wait, the one with the longest wait is closed, preferably one without
+    /// a good call.
     fn add(&self, connection: &Connection) {
         let mut waiting = self.lock();
         if connection.crowding.is_out.load(Ordering::Relaxed) {
@@ -142,7 +142,7 @@ impl Connection {
         self.address
     }
 
-    /// Returns once this connection has to close because too many of its address wait.
+    /// Returns once this connection has to close because too many connections of its address wait.
     pub async fn crowded_out(&self) {
         self.crowding.told.notified().await;
     }
@@ -172,8 +172,8 @@ impl Connection {
         self.lock().header_since.get_or_insert_with(Instant::now);
     }
 
-    /// Returns the end of the wait. A connection without a good call has one header time limit for wait
-    /// and header together.
+    /// Returns the time at which the wait ends. For a connection without a good call, the header time limit
+    /// covers both the wait and the header.
     fn deadline(&self) -> Instant {
         let RequestWait { since, header_since } = *self.lock();
         match (self.is_trusted(), header_since) {

@@ -25,7 +25,7 @@ impl SplitMix64 {
     }
 }
 
-/// Returns a value that a schema allows, as far as this generator understands the schema.
+/// Returns a value that a schema allows, as far as this generator supports the schema.
 pub fn allowed(schema: &Value, random: &mut SplitMix64) -> Value {
     if let Some(choices) = schema["anyOf"].as_array().filter(|_| schema["type"].is_null()) {
         return allowed(random.of(choices), random);

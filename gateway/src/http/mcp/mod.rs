@@ -43,8 +43,8 @@ use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 /// Accept header that the library requires; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
-/// Returns a host's text for its model about the server as a whole, limited to the calls that `caller` may
-/// make.
+/// Returns the instructions about the server that a host passes to its model, limited to the calls that
+/// `caller` may make.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call start_episode, whose tasks list_tasks names, then look".into(),
@@ -327,8 +327,8 @@ fn remove_images(seen: &mut Value) {
     }
 }
 
-/// Returns true if the client asks for output schemas and structured content, which is the reply once more,
-/// by the query of its URL. A model would read both.
+/// Returns true if the query of the client's URL requests output schemas and structured content. Structured
+/// content repeats the reply, and a model would read both.
 fn wants_structure(context: &RequestContext<RoleServer>) -> bool {
     let query = context.extensions.get::<Parts>().and_then(|parts| parts.uri.query());
     query.into_iter().flat_map(|query| query.split('&')).any(|pair| pair == "output=structured")
@@ -371,7 +371,7 @@ struct DuplicateField(String);
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     accept_whatever_fits(&mut parts);
-    // The gate has received it, within its limit.
+    // The gate has already received the body, within its limit.
     let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
     if parts.method == Method::POST
         && let Err(error) = envelope::check(&bytes)

@@ -1,4 +1,4 @@
-//! Evaluations in the runs folder with their progress; other processes play them.
+//! Evaluations in the runs folder, which other processes play, and their progress.
 
 use std::{
     collections::BTreeMap,
@@ -34,14 +34,14 @@ struct EvaluationCounts {
     excluded: usize,
 }
 
-/// Progress of an evaluation, as its card shows it.
+/// Progress of an evaluation for its card on the page.
 #[derive(Debug, Serialize)]
 pub struct EvaluationEntry {
-    /// Its folder, relative to the runs folder.
+    /// The evaluation's folder, relative to the runs folder.
     folder: String,
     #[serde(flatten)]
     counts: EvaluationCounts,
-    /// Number of planned episodes; left out if it is not known.
+    /// Number of planned episodes; left out if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     planned: Option<usize>,
     /// Time of the latest episode, in seconds since 1970.
