@@ -25,7 +25,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// State of the server for its handlers.
 #[derive(Debug, Clone)]
 pub struct AppState {
-    /// The episodes that are held.
+    /// Episodes that the server holds.
     pub table: Arc<EpisodeTable>,
     /// Settings of the server.
     pub settings: Arc<Settings>,

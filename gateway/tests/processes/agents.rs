@@ -1,5 +1,5 @@
-//! Tests of language models, which Python plays: the errors if it cannot, and its start. A script
-//! replaces Python here; the package's own tests cover the loop.
+//! Tests of language models, which Python plays: the start of Python, and the errors if it cannot play. A
+//! script replaces Python here. The package's own tests cover the loop.
 
 use std::{
     fs,
@@ -18,7 +18,8 @@ fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
     (output, printed.concat())
 }
 
-/// Creates an interpreter that runs `what` instead of the loop, or `when_checked` if it is only checked.
+/// Creates an interpreter that runs `what` instead of the loop, or `when_checked` if it gets the flag
+/// `--check`.
 #[cfg(unix)]
 fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;

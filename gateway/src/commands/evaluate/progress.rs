@@ -1,4 +1,4 @@
-//! Progress of an evaluation: a bar on a terminal, or a line a minute in the log.
+//! Progress of an evaluation: a bar on a terminal, or a line in the log every minute.
 
 use std::{
     sync::{Mutex, MutexGuard, mpsc},
@@ -16,8 +16,8 @@ const TICK: Duration = Duration::from_secs(1);
 /// Interval between two progress lines in the log.
 const LINE_EVERY: Duration = Duration::from_secs(60);
 
-/// Delays of the log lines about a wait for the policy: the first, and the interval after that. After a
-/// minute, there is one a minute.
+/// Delays of the log lines about a wait for the policy: the first delay, and the interval after that. After a
+/// minute, the interval is a minute.
 const WAIT_FIRST: Duration = Duration::from_secs(2);
 const WAIT_EVERY: Duration = Duration::from_secs(10);
 
@@ -26,7 +26,7 @@ const WAIT_EVERY: Duration = Duration::from_secs(10);
 pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(EpisodeEvent) + Sync)) -> T) -> T {
     let tally = Mutex::new(Tally { planned: plan.episodes().0.len(), ..Tally::default() });
     let lock = || -> MutexGuard<'_, Tally> {
-        // Counting leaves every count valid.
+        // The counts stay valid even if a thread panics while it holds the lock.
         tally.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     };
     let began = Instant::now();
@@ -80,7 +80,7 @@ struct Tally {
     /// Number of episodes that this run has played or tried to play.
     played: usize,
     left_out: usize,
-    /// Number of episodes of both runs that do not count.
+    /// Number of episodes of this and the earlier run that do not count.
     excluded: usize,
     /// Number of episodes that count and have not succeeded.
     failed: usize,
@@ -172,8 +172,8 @@ struct Schedule {
 }
 
 impl Schedule {
-    /// Returns the lines that are due after `elapsed`, when the policy has been waited for as long as
-    /// `waited`.
+    /// Returns the lines that are due after `elapsed`. `waited` is the time for which the policy has been
+    /// waited for.
     fn due(&mut self, elapsed: Duration, waited: Option<Duration>) -> impl Iterator<Item = DueLine> {
         // A wait that is shorter than before is a new one.
         self.wait = self.wait.filter(|told| waited.is_some_and(|waited| waited >= *told));

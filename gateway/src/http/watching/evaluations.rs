@@ -59,7 +59,7 @@ impl KnownEvaluations {
         let mut found: Vec<(SystemTime, EvaluationEntry)> = folders
             .into_iter()
             .filter_map(|folder| {
-                // Every played episode adds a file there.
+                // Every played episode adds a file to this folder.
                 let changed = fs::metadata(folder.join(EPISODES)).and_then(|found| found.modified()).ok()?;
                 let counts = match known.get(&folder) {
                     Some((then, counts)) if *then == changed => counts.clone(),
