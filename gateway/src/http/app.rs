@@ -104,8 +104,8 @@ pub async fn counted<T>(
     answer
 }
 
-/// Returns the tool called `name`. Only known names are counted, because callers could invent any number
-/// of others.
+/// Returns the tool called `name`. Only known names are counted, because callers could invent any number of
+/// names.
 fn known(name: &str) -> Option<&'static str> {
     every_tool().into_iter().find(|tool| *tool == name)
 }

@@ -75,7 +75,7 @@ const BOUNDS_S: [f64; 12] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.
 /// Durations, counted in buckets.
 #[derive(Debug, Default)]
 pub struct Histogram {
-    /// Number of durations per bucket; the last counts those above every bound.
+    /// Number of durations per bucket. The last bucket counts the durations above every bound.
     counts: [u64; BOUNDS_S.len() + 1],
     sum: Duration,
 }

@@ -12,7 +12,7 @@ use tandem_episodes::RendererKind;
 use super::{Finding, Findings};
 use crate::{drivers::interpreter, settings::Layer};
 
-/// Extras of the wheel that users miss most, with the modules that each installs.
+/// Extras of the wheel that users most often lack, with the modules that each installs.
 pub(super) const EXTRAS: [(&str, &[&str]); 4] = [
     ("agents", &["anthropic", "openai"]),
     ("gym", &["gymnasium"]),

@@ -1,5 +1,5 @@
-//! `tandem doctor`: checks which of a server's settings work on this machine, with advice on those that
-//! do not.
+//! `tandem doctor`: checks whether a server's settings work on this machine, and advises on those that do
+//! not.
 
 mod around;
 mod given;

@@ -198,8 +198,8 @@ mod tests {
         let free = PolicyPrices::default();
         let uncached = "usd-per-million-input=2&usd-per-million-output=10";
         let (unpriced, priced) = (usage(None), usage(Some(3.0)));
-        // The usage is 0.5 million uncached input tokens, 1.5 million cached ones and 10,000 output tokens: 1
-        // + 0.3 + 0.1.
+        // Uncached input is 0.5 million tokens, cached input 1.5 million, and output 10,000: 1 + 0.3 + 0.1
+        // dollars.
         let given = prices(&format!("{uncached}&usd-per-million-cached=0.2"));
         check(&[&priced, &unpriced], &given, "1.40 US dollars an episode, 42.00 for all");
         check(&[&unpriced], &prices(uncached), "4.10 US dollars an episode, 123.00 for all");

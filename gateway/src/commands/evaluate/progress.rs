@@ -21,8 +21,8 @@ const LINE_EVERY: Duration = Duration::from_secs(60);
 const WAIT_FIRST: Duration = Duration::from_secs(2);
 const WAIT_EVERY: Duration = Duration::from_secs(10);
 
-/// Runs `work` with a callback for events of episodes, and meanwhile reports the progress of the episodes
-/// of `plan`.
+/// Runs `work` with a callback for events of episodes, and reports the progress of the episodes of `plan`
+/// while it runs.
 pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(EpisodeEvent) + Sync)) -> T) -> T {
     let tally = Mutex::new(Tally { planned: plan.episodes().0.len(), ..Tally::default() });
     let lock = || -> MutexGuard<'_, Tally> {

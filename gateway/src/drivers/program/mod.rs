@@ -179,8 +179,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // A program that exited normally had done its part if the others completed the episode, or if
-                // another program caused its end.
+                // A program that exited normally had done its part if the other programs completed the
+                // episode, or if another program caused its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),

@@ -37,7 +37,7 @@ impl ProcessGroups {
 /// A program with all its children. Dropping it stops them.
 pub struct ProcessGroup {
     child: Child,
-    /// Process that ends the group once this process is gone for any reason; `None` if it could not be
+    /// Process that ends the group once this process has ended for any reason; `None` if it could not be
     /// started.
     guard: Option<Child>,
     groups: Arc<ProcessGroups>,
@@ -189,10 +189,10 @@ mod system {
     }
 
     /// Shell script that waits for a line and kills the group if its input ends without one. The kernel
-    /// closes the pipe of a process that is gone.
+    /// closes the pipe of a process that has ended.
     const GUARD: &str = r#"trap '' HUP INT TERM; read -r line || kill -s KILL -- "-$1""#;
 
-    /// Starts the guard, which ends the group once this process is gone.
+    /// Starts the guard, which ends the group once this process has ended.
     pub fn guard(id: u32) -> io::Result<Option<Child>> {
         let mut shell = shell(GUARD);
         shell.args(["tandem-guard", &id.to_string()]);

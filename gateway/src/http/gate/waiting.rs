@@ -1,7 +1,7 @@
 //! Idle connections: their time limits, and their number per address.
 //!
-//! A language model may think for minutes between two calls. So a connection that has made a good call
-//! may stay idle for an hour. All others have the time limit of a header.
+//! A language model may think for minutes between two calls. So a connection that has made a good call may
+//! stay idle for an hour. All other connections have the time limit of a header.
 
 use std::{
     collections::HashMap,

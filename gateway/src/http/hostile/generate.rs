@@ -141,7 +141,7 @@ pub fn text(random: &mut SplitMix64) -> String {
     (*random.of(&TEXTS)).into()
 }
 
-/// Serializes a body as it may arrive: mostly JSON, sometimes corrupted.
+/// Serializes a body as a server may receive it: mostly JSON, sometimes corrupted.
 pub fn bytes(value: &Value, random: &mut SplitMix64) -> Vec<u8> {
     let mut bytes = value.to_string().into_bytes();
     if random.percent(85) {

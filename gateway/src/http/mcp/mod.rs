@@ -192,8 +192,8 @@ impl ServerHandler for McpServer {
                 result.structured_content = value;
                 result
             }
-            // A refusal is returned as the tool's answer, which the model reads; protocol errors often
-            // stay with the host.
+            // A refusal is returned as the tool's answer, which the model reads. Hosts often do not show
+            // protocol errors to the model.
             Err(error) => CallToolResult::error(refusal_blocks(&error)),
         };
         Ok(result.into())
@@ -201,8 +201,8 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    /// Returns the instructions for `caller`. An operator's contain its part of the task and advice on
-    /// playing with partners, since a model may see no other part of the briefing.
+    /// Returns the instructions for `caller`. An operator's instructions contain its part of the task and
+    /// advice on playing with partners, since a model may see no other part of the briefing.
     async fn instructions(&self, caller: &Caller) -> String {
         let begin = instructions(caller);
         let Caller::Operator { episode, .. } = caller else { return begin };

@@ -35,7 +35,7 @@ pub const ENTER: &str = "/operate/enter";
 /// Prefix of the names of cookies with operators' tokens; the robot's name follows.
 const COOKIE: &str = "tandem_operator_";
 
-/// Interval between two updates of the robots that the page's robot waits for.
+/// Interval between updates of the list of robots for which the page's robot waits.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Number of answers for the page's own robot per full report, which gives five reports a second.
@@ -45,7 +45,7 @@ const ANSWERS_PER_REPORT: usize = 10;
 #[derive(Debug, Clone)]
 pub struct DrivenRobots(pub Vec<String>);
 
-/// A message of a page, with at most one of three kinds of setpoint.
+/// A message of a page, with exactly one of three kinds of setpoint.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Word {
@@ -60,7 +60,7 @@ struct Word {
     /// True to receive the robot's state after each of its commands.
     #[serde(default)]
     states: bool,
-    /// True while time may pass.
+    /// True while simulated time may advance.
     go: bool,
     /// Number of control steps for single stepping.
     #[serde(default)]

@@ -1,4 +1,4 @@
-//! `/`: the start page. It shows episodes and tasks, starts episodes, and says how to connect an agent.
+//! `/`: the start page. It shows episodes and tasks, starts episodes, and explains how to connect an agent.
 //!
 //! It consists only of script and style, so it is public. It gets its data over REST, and with the watch
 //! link.

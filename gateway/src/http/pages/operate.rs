@@ -85,8 +85,8 @@ async fn expert(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Lets partners' commands continue over those of the calling operator, which sends one control step after
-/// another in real time.
+/// Lets partners' commands continue while the calling operator's page sends one control step after another in
+/// real time.
 async fn pace(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,

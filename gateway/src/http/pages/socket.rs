@@ -28,7 +28,7 @@ use tungstenite::{
 
 use crate::http::problem::ApiError;
 
-/// Time without progress after which a page counts as gone.
+/// Time without progress after which a page counts as disconnected.
 const WRITE_LIMIT: Duration = Duration::from_secs(10);
 
 /// Maximum length of a message from a page in bytes.

@@ -152,7 +152,7 @@ pub enum ApiError {
          application/msgpack"
     )]
     ContentType(String),
-    /// Too many requests are under way.
+    /// Too many requests are in progress.
     #[error("{limit} requests are under way, which is the most; send it again")]
     Busy {
         /// Maximum number of concurrent requests.

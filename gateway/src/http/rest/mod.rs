@@ -1,4 +1,4 @@
-//! REST routes: those under `/v1`, and those about the server itself.
+//! REST routes: the routes under `/v1`, and routes about the server itself.
 
 mod docs;
 mod home;

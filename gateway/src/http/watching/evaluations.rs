@@ -51,7 +51,7 @@ pub struct EvaluationEntry {
 }
 
 impl KnownEvaluations {
-    /// Lists the evaluations below `runs`, those with the latest changes first.
+    /// Lists the evaluations below `runs`, most recently changed first.
     pub fn list(&self, runs: &Path) -> Vec<EvaluationEntry> {
         let mut folders = Vec::new();
         collect(runs, DEPTH, &mut folders);

@@ -51,7 +51,7 @@ impl RecordingReader {
         RecordingReader(jobs)
     }
 
-    /// Runs `work` on the thread when its turn comes, unless the caller has gone by then.
+    /// Runs `work` on the thread when its turn comes, unless the caller has disconnected by then.
     pub async fn read<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut LastOpened) -> Result<T, ApiError> + Send + 'static,
