@@ -27,7 +27,7 @@ use crate::{
     token::Token,
 };
 
-/// Interval between two checks whether an episode has ended.
+/// Interval between checks for the end of an episode.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Maximum time that the other robots wait for an absent person.

@@ -5,7 +5,8 @@
 
 use std::{env, io, process::Command};
 
-/// Environment variable that names the interpreter with the package. The command of a wheel sets its own.
+/// Environment variable that names the interpreter with the package. The wheel's command sets it to its own
+/// interpreter.
 const PYTHON_VARIABLE: &str = "TANDEM_PYTHON";
 /// On Windows `python3` is an alias that opens the Microsoft Store.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };

@@ -72,7 +72,7 @@ impl AppState {
         }
     }
 
-    /// Returns the tools that `caller` may use. Talking is only for operators that may talk.
+    /// Returns the tools that `caller` may use. The tools for talking are only for operators that may talk.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         let mut specs = match self.table.may_talk(caller) {
             true => operator_tool_specs(self.wording(caller)),

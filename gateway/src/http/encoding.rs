@@ -13,7 +13,7 @@ use super::{
     problem::ApiError,
 };
 
-/// Media types of MessagePack: the registered one, and an older one.
+/// Media types of MessagePack: the registered type and an older type.
 const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
 
 /// Formats of a request's body and of its reply.

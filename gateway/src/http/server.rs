@@ -111,7 +111,8 @@ impl Server {
         self.address
     }
 
-    /// Returns the watch link. It grants full view, so it must not be logged or given to policies.
+    /// Returns the watch link. It grants a full view of all episodes, so it must not be logged or given to
+    /// policies.
     pub fn watch_link(&self) -> &str {
         &self.watch_link
     }
@@ -142,7 +143,7 @@ impl Server {
         Ok((self.table.get(id)?, start))
     }
 
-    /// Ends the episode `id` and forgets it.
+    /// Ends the episode `id` and removes it.
     pub fn remove(&self, id: &str) -> Result<(), HostingError> {
         self.runtime.block_on(self.table.remove(id)).map(drop)
     }

@@ -1,4 +1,4 @@
-//! Test of an episode with diverging physics, over HTTP and at the same time as a normal one.
+//! Test of an episode with diverging physics, over HTTP and at the same time as a normal episode.
 
 use std::{path::Path, sync::Arc};
 

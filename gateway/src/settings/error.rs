@@ -82,7 +82,7 @@ pub enum SettingsError {
     /// The scene, the robot, the base controller or the renderer cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// The robot has changed since it was read.
+    /// The robot has changed since it was read, or does not fit the task or the base controller.
     #[error(transparent)]
     Robot(#[from] RobotError),
     /// The file is not valid TOML, or has an unknown setting.

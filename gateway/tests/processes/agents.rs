@@ -115,7 +115,7 @@ fn a_run_costs_no_more_than_its_limit() {
     let (output, printed) = evaluate(priced, &["--max-usd", "1.5", "--out", out]);
     assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
     assert!(printed.contains("the run has cost 1.40 US dollars, and another episode may pass --max-usd 1.5"));
-    // Kept episodes count.
+    // Kept episodes count towards the limit.
     let (output, printed) = evaluate(priced, &["--max-usd", "2", "--out", out]);
     assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
     let (output, printed) = evaluate(priced, &["--dry-run", out]);

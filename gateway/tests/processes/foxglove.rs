@@ -22,7 +22,7 @@ const MESSAGE_DATA: u8 = 1;
 /// A connected client.
 struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// Number of each advertised topic's channel.
+    /// Channel number of each advertised topic.
     channels: BTreeMap<String, u64>,
 }
 

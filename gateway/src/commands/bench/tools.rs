@@ -22,7 +22,7 @@ const CALLS: usize = 2000;
 const WARM_UP: usize = 100;
 /// Number of timed calls of `wait`. An episode of the benchmark protocol has enough control steps for them.
 const WAITS: usize = 30;
-/// Control steps of each wait.
+/// Number of control steps of each call of `wait`.
 const STEPS: u32 = 25;
 
 /// Times of calls in an episode of two robots, which is recorded as usual.
@@ -50,7 +50,7 @@ pub struct CallTimes {
 /// Times of `wait` with [`STEPS`] steps.
 #[derive(Debug, Serialize)]
 pub struct WaitTimes {
-    /// Control steps of each call.
+    /// Number of control steps of each call.
     pub steps: u32,
     /// Number of calls.
     pub calls: usize,

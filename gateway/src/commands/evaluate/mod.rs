@@ -1,4 +1,4 @@
-//! `tandem evaluate`: a policy's success over tasks and seeds.
+//! `tandem evaluate`: the success rates of a policy over tasks and seeds.
 
 mod costs;
 mod progress;

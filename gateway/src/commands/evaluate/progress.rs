@@ -175,7 +175,7 @@ impl Schedule {
     /// Returns the lines that are due after `elapsed`. `waited` is the time for which the policy has been
     /// waited for.
     fn due(&mut self, elapsed: Duration, waited: Option<Duration>) -> impl Iterator<Item = DueLine> {
-        // A wait that is shorter than before is a new one.
+        // A wait that is shorter than before is a new wait.
         self.wait = self.wait.filter(|told| waited.is_some_and(|waited| waited >= *told));
         let next_wait = match self.wait {
             None => WAIT_FIRST,
@@ -234,7 +234,7 @@ mod tests {
         let first: Vec<u32> = (1..=200).filter(|s| said(*s, Some(*s))).collect();
         assert_eq!(first, [2, 12, 22, 32, 42, 52, 62, 122, 182]);
         assert!(!said(201, None));
-        // The next wait is a new one.
+        // A shorter wait counts as a new wait.
         assert_eq!((202..=220).filter(|s| said(*s, Some(*s - 201))).collect::<Vec<_>>(), [203, 213]);
     }
 

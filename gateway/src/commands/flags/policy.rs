@@ -231,7 +231,7 @@ fn agent(
     Ok(Program::agent(&agent, name, card, driving, Duration::from_secs(limit_s.into()))?)
 }
 
-/// Creates the policy at `urls` with the map that `flag` gives, or else the protocol's default.
+/// Creates the policy at `urls` with the map that `flag` gives, or else with the protocol's default map.
 fn remote_policy(
     protocol: PolicyProtocol,
     urls: Vec<String>,

@@ -36,7 +36,7 @@ impl KeptOutput {
 
     /// Waits until all output is written, for at most `LAST_WORDS_WAIT`.
     pub fn finish(self) {
-        // The other end sends no data; it is dropped at the end.
+        // The sender sends no data. It is dropped when all output is written.
         let _ = self.0.recv_timeout(LAST_WORDS_WAIT);
     }
 }

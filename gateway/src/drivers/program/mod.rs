@@ -244,7 +244,7 @@ impl Program {
         if result.tool_calls == 0 {
             return Err(PlayError::NotReady(stopped.unwrap_or_else(|| "the program made no call".into())));
         }
-        // A hanging program counts as a failed one.
+        // A hanging program counts as failed.
         let ended = match result.ended {
             EndReason::Abandoned => EndReason::PolicyFailed,
             ended => ended,
@@ -325,7 +325,7 @@ struct FoundProgram {
     env_steps: u32,
     /// Exit status as text.
     status: String,
-    /// Reason of the program's last refusal, if it has failed.
+    /// Reason for the program's last refusal, if the program has failed.
     refusal: Option<String>,
 }
 

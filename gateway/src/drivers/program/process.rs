@@ -176,7 +176,7 @@ mod system {
 
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
-    /// Creates the process of the shell that runs a command.
+    /// Prepares a shell process that runs a command.
     pub fn shell(command: &str) -> Command {
         let mut shell = Command::new("sh");
         shell.args(["-c", command]);
@@ -241,7 +241,7 @@ mod system {
         process::{Child, Command, Stdio},
     };
 
-    /// Creates the process of the shell that runs a command. It only removes the outer quotes.
+    /// Prepares a shell process that runs a command. The shell only removes the outer quotes.
     pub fn shell(command: &str) -> Command {
         let mut shell = Command::new("cmd");
         shell.args(["/S", "/C"]).raw_arg(format!("\"{command}\""));
@@ -258,7 +258,7 @@ mod system {
         Ok(child.try_wait()?.map(|status| status.success()))
     }
 
-    /// Kills the group, since a program without windows cannot be asked.
+    /// Kills the group, since a program without windows cannot be asked to end.
     pub fn terminate(id: u32) {
         kill_group(id);
     }

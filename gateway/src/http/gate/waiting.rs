@@ -132,7 +132,7 @@ pub struct Connection {
 #[derive(Debug, Clone, Copy)]
 struct RequestWait {
     since: Instant,
-    /// Arrival of the first byte of its header.
+    /// Time at which the first byte of the header was received.
     header_since: Option<Instant>,
 }
 
@@ -147,7 +147,7 @@ impl Connection {
         self.crowding.told.notified().await;
     }
 
-    /// Counts the connection as busy, because its request has arrived and is admitted.
+    /// Counts the connection as busy, because its request was received and admitted.
     pub fn is_served(&self) {
         self.all.remove(self);
     }

@@ -288,8 +288,8 @@ impl McpServer {
     }
 }
 
-/// Asks for a short reply, unless the call requests a full one: a model reads the whole reply, and the
-/// instructions say so.
+/// Requests a short reply, unless the call sets `short`, because a model reads the whole reply. The
+/// instructions mention this default.
 fn short_unless_given(mut args: Value) -> Value {
     if let Some(args) = args.as_object_mut() {
         args.entry("short").or_insert(true.into());

@@ -62,7 +62,7 @@ struct Word {
     states: bool,
     /// True while simulated time may advance.
     go: bool,
-    /// Number of control steps for single stepping.
+    /// Number of control steps to advance, for single stepping.
     #[serde(default)]
     steps: u32,
 }
@@ -111,8 +111,8 @@ pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
-/// Returns the operator of `robot` that owns the token in its cookie. Browsers send one cookie per robot;
-/// a second is ignored.
+/// Returns the operator of `robot` that owns the token in its cookie. Browsers send one cookie per robot; a
+/// second cookie is ignored.
 async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
     let (_, token) = cookies.iter().find(|(name, _)| name.strip_prefix(COOKIE) == Some(robot))?;
     app.table.operator_anywhere(token).await.filter(|caller| caller.robot() == Some(robot))
@@ -182,7 +182,7 @@ fn setpoint(
     }
 }
 
-/// The sending side of a page that drives.
+/// Sending side of the connection to a page that drives.
 struct DriversPage {
     robot: String,
     disclosure: Disclosure,

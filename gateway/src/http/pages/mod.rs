@@ -1,5 +1,5 @@
-//! Web pages: `/` is the start page, `/watch` shows running and finished episodes. A page gets its data over
-//! a WebSocket; its script and style are embedded in this binary from `gateway/web`.
+//! Web pages: `/` is the start page, `/watch` shows running and finished episodes. A page gets its data by
+//! HTTP requests and over a WebSocket. Its script and style are embedded in this binary from `gateway/web`.
 
 mod collecting;
 pub mod drive;

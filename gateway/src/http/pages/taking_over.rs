@@ -1,5 +1,4 @@
-//! "Take over here": people continue a finished episode from one of its moments, as an episode of their
-//! own.
+//! "Take over here": people continue a finished episode from one of its moments, as a separate episode.
 
 use axum::{
     Extension,

@@ -18,7 +18,7 @@ const DEPTH: usize = 3;
 /// Time without progress after which an evaluation of unknown state counts as stopped.
 const STOPPED_AFTER: Duration = Duration::from_secs(600);
 
-/// Results of the last reading, by folder.
+/// Counts from the last reading of each evaluation, with the time of its last change, by folder.
 #[derive(Debug, Clone, Default)]
 pub struct KnownEvaluations(Arc<Mutex<BTreeMap<PathBuf, (SystemTime, EvaluationCounts)>>>);
 
@@ -104,7 +104,7 @@ fn entry(
 fn is_played(folder: &Path, planned: PlannedEpisodes, played: usize, changed: SystemTime) -> bool {
     match (planned.state, is_being_played(folder)) {
         (Some(RunState::Complete | RunState::Stopped), _) => false,
-        // The process may have ended without recording it.
+        // The process may have ended without recording its end.
         (_, Some(is_played)) => is_played,
         (_, None) => {
             let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);

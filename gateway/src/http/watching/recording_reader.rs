@@ -1,4 +1,4 @@
-//! The thread that reads recordings for watchers of finished episodes. It keeps the last one in memory.
+//! The thread that reads recordings for watchers of finished episodes. It keeps the last recording in memory.
 //!
 //! A recording takes tens of megabytes while it is read, and an allocator keeps freed memory for the
 //! thread that had requested it. With many reading threads, each would keep that much.

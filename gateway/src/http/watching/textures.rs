@@ -1,4 +1,4 @@
-//! Images on surfaces of the scenes that pages have seen, by their hashes.
+//! Surface images of the scenes that pages have drawn, by their hashes.
 
 use std::{
     collections::HashMap,
