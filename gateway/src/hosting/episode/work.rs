@@ -1,4 +1,5 @@
-//! The thread that plays an episode, from its start or its journal to its end or its sleep.
+//! The thread that plays an episode, from the start or the replay of the journal to the end or the
+//! suspension.
 
 use std::{
     sync::{Arc, PoisonError},
@@ -20,7 +21,7 @@ use crate::hosting::{
     durable::{Commit, JournalFile, JournalReader, Lease, Leasing},
 };
 
-/// Stack size; the contact solver keeps large temporaries on the stack.
+/// Stack size in bytes; the contact solver keeps large temporaries on the stack.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Origin of a thread's session.
@@ -72,7 +73,8 @@ fn play(stage: &Arc<Stage>, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     };
     let Left::Closed(closed) = desk.work(inbox) else { return };
     stage.feed.close();
-    // The place is freed before the caller receives the result, so that it can start the next episode.
+    // The place is released before the caller receives the result, so that the caller can start the next
+    // episode.
     stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some((reply, result)) = closed {
         let _ = reply.send(*result);
@@ -113,7 +115,7 @@ impl Stage {
             notes.append(&mut noted);
             memory = remembered.or(memory);
         }
-        // A recording that is complete is not written again.
+        // A complete recording is not written again.
         let is_written = entries.last().is_some_and(|entry| entry.ended.is_some())
             && self.folder.path.join(RESULT_FILE).exists();
         let session = Session::bring_back(BringBack {
