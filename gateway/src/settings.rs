@@ -33,7 +33,8 @@ pub use durability::Durability;
 pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
-/// One source of settings; missing ones come from the next source. The doc comments are help texts.
+/// One source of settings. Missing settings come from the next source. The doc comments are help texts of the
+/// command line.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
@@ -56,7 +57,7 @@ pub struct Layer {
     /// [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// The token itself. It is never a flag, which the process list would show, nor a line of the
+    /// The token itself. It can be neither a flag, because the process list would show it, nor a line of the
     /// settings file.
     #[arg(skip)]
     #[serde(skip)]
@@ -212,7 +213,7 @@ impl Layer {
         }
     }
 
-    /// Returns these settings, with missing ones from the file at `config`.
+    /// Returns these settings, with missing settings filled in from the file at `config`.
     pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
         Ok(self.or(read_layer(config)?))
     }

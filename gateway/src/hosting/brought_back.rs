@@ -1,4 +1,4 @@
-//! Episodes of a server that has ended, or of other servers on the same runs folder.
+//! Restoring of episodes of a server that has ended, or of other servers on the same runs folder.
 //!
 //! The episodes are found by their journals and stay suspended until a request needs them. This module also
 //! suspends episodes that stay idle for long.
@@ -85,8 +85,8 @@ impl EpisodeTable {
         spawn_blocking(move || table.operator_elsewhere(&text)).await.ok()?
     }
 
-    /// Finds the operator with this token among the episodes that are not held here. The heading of a journal
-    /// is read only once, not for every token tried. All tokens are compared.
+    /// Finds the operator with the token `text` among the episodes that this server does not hold. The
+    /// heading of a journal is read only once, not for every token tried. All tokens are compared.
     fn operator_elsewhere(&self, text: &str) -> Option<Caller> {
         let journals = self.journals.get()?;
         let ids = journals.ids();
@@ -148,7 +148,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Ends abandoned episodes and suspends idle ones. Also reconnects the partners that drove on the
+    /// Ends abandoned episodes and suspends idle episodes. Also reconnects the partners that drove on the
     /// previous server. Call it periodically from within the async runtime.
     pub fn tidy_up(&self) {
         let episodes = self.all();

@@ -20,10 +20,10 @@ pub enum HostingError {
         /// Requested id.
         id: String,
     },
-    /// All places for episodes are taken.
+    /// The episode limit is reached.
     #[error("all {limit} places for episodes are taken")]
     TooManyEpisodes {
-        /// Number of places.
+        /// Maximum number of episodes.
         limit: u32,
     },
     /// Too many calls are waiting for one episode.
@@ -207,7 +207,7 @@ pub enum HostingError {
 }
 
 impl HostingError {
-    /// Returns the refusal that the caller receives.
+    /// Returns the refusal to send to the caller.
     pub fn refusal(&self) -> Refusal {
         use RefusalClass::{
             Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,

@@ -58,7 +58,7 @@ pub struct HostedEpisode {
 pub struct Beside {
     /// Operators of the robots; `None` if one policy controls all robots.
     team: Option<Arc<Team>>,
-    /// Replies that may be requested again.
+    /// Replies by idempotency key, for repeated requests.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
     notes: IdempotencyCache<Note, SharedNote>,
     /// Images to which replies link.
@@ -122,7 +122,7 @@ impl HostedEpisode {
         HostedEpisode { id: id.into(), thread, beside }
     }
 
-    /// Returns the operators; `None` if one policy controls all robots.
+    /// Returns the robots' operators; `None` if one policy controls all robots.
     pub fn team(&self) -> Option<&Arc<Team>> {
         self.beside.team.as_ref()
     }
@@ -241,7 +241,7 @@ impl HostedEpisode {
         }
     }
 
-    /// Returns true if operators may talk.
+    /// Returns true if operators may send messages to each other.
     pub fn may_talk(&self) -> bool {
         self.team().is_some_and(|team| team.may_talk())
     }
@@ -261,13 +261,13 @@ impl HostedEpisode {
         Err(EpisodeError::from(SpecError::UnknownTool { name: tool.into(), have }).into())
     }
 
-    /// Ends the episode as [`EpisodeThread::close`] does, and notifies operators that wait for each
-    /// other.
+    /// Closes the episode as [`EpisodeThread::close`] does, and ends the calls of operators that wait for
+    /// each other.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
         self.close_for(false).await
     }
 
-    /// Closes the episode. If `keep` is true, the episode can be brought back and continued.
+    /// Closes the episode. If `keep` is true, the episode can be resumed later.
     pub async fn close_for(&self, keep: bool) -> Result<ResultReply, HostingError> {
         let result = if keep { self.thread.leave().await } else { self.thread.close().await };
         if let Some(team) = self.team() {

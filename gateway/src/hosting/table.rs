@@ -41,7 +41,7 @@ pub struct EpisodeTable {
     purpose: Purpose,
     /// Folder of the journals, set if episodes outlive the server.
     pub(super) journals: OnceLock<LiveFolder>,
-    /// Operators of the episodes that other servers play, by episode id.
+    /// Operators of episodes that this server does not hold, by episode id.
     pub(super) others: Mutex<BTreeMap<String, Team>>,
     partner: Option<Arc<dyn PartnerPolicy>>,
 }
@@ -275,7 +275,7 @@ impl EpisodeTable {
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
         }
         match self.settings.assistance {
-            // The phases that are scored are not part of the task's description in the paper.
+            // In the paper, the scored phases are not part of a task's description.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
             Assistance::Full => {}
         }
@@ -352,7 +352,7 @@ impl EpisodeTable {
 
     /// Returns the operator with the token `text`. Compares every token of every episode.
     ///
-    /// Between two episodes, the people of a collection are operators of an episode with an empty id.
+    /// Between two episodes, the people of a collection count as operators of an episode with an empty id.
     pub fn operator(&self, text: &str) -> Option<Caller> {
         let seat = self.collection().and_then(|collection| collection.robot_of(text));
         let seat = seat.map(|robot| Caller::Operator { episode: String::new(), robot: robot.into() });

@@ -1,5 +1,5 @@
-//! The journal of an episode as a file: a heading line, then one line for each group of calls that were
-//! answered together.
+//! Journal file of an episode: a heading line, then one line for each group of calls that were answered
+//! together.
 //!
 //! An incomplete line is ignored, so an action is never recorded without its answer.
 
@@ -203,7 +203,7 @@ impl JournalFile {
         }
     }
 
-    /// Removes the journal, so that the episode is not brought back.
+    /// Removes the journal, so that the episode cannot be restored.
     pub fn remove(self) -> io::Result<()> {
         fs::remove_file(&self.path)
     }

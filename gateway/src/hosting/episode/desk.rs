@@ -24,7 +24,7 @@ pub type Job = Box<dyn FnOnce(Result<&mut Desk, HostingError>) + Send>;
 /// Outcome of a job.
 pub type Outcome<T> = Result<T, HostingError>;
 
-/// Sender of an episode's result to the caller that has asked for its end.
+/// Sender of an episode's result to the caller that requested the end.
 pub type ResultSender = oneshot::Sender<Outcome<ResultReply>>;
 
 /// A session and the journal in which its calls are written.
@@ -47,14 +47,14 @@ pub struct Log {
 
 /// A request to close the episode.
 pub struct Closing {
-    /// True if the next server is to bring the episode back.
+    /// True to keep the journal, so that the next server can restore the episode.
     pub keep: bool,
     pub reply: ResultSender,
 }
 
 /// Reason why the thread ended.
 pub enum Left {
-    /// The caller that asked for the end, and the result it receives once the place is free.
+    /// Sender to the caller that requested the end, and the result to send once the permit is released.
     Closed(Option<(ResultSender, Box<Outcome<ResultReply>>)>),
     Asleep,
 }
@@ -173,7 +173,7 @@ impl Desk {
         }
     }
 
-    /// Starts the journal from which the episode can be brought back.
+    /// Begins the journal from which the episode can be restored.
     pub fn begin_journal(&mut self, heading: &Heading) -> Outcome<()> {
         let Some(journals) = &self.stage.journals else { return Ok(()) };
         let Some(path) = journals.journal(&self.stage.id) else { return Ok(()) };
@@ -188,7 +188,7 @@ impl Desk {
         });
         match begun {
             Ok(log) => {
-                // After a panic there is no state to keep.
+                // The error after a panic is ignored, because there is no state to keep.
                 let _ = self.session.run(Session::keep_journal);
                 self.log = Some(log);
                 self.stage.status.durable.store(true, Relaxed);

@@ -104,7 +104,7 @@ impl EpisodeThread {
         }
     }
 
-    /// Starts to write a journal from which a later process can bring the episode back.
+    /// Begins to write a journal from which a later process can restore the episode.
     pub async fn begin_journal(&self, heading: Heading) -> Result<(), HostingError> {
         self.queue.work(move |desk| desk.begin_journal(&heading)).await
     }
@@ -260,8 +260,8 @@ impl EpisodeThread {
         self.watch_as(None).await
     }
 
-    /// Does the same as [`EpisodeThread::watch`] for the person who drives `robot` and receives every
-    /// step. That person sees privileged information, which is recorded and named in results.
+    /// Does the same as [`EpisodeThread::watch`] for the person who drives `robot` and receives every step.
+    /// The recording and the results name the privileged information that this person sees.
     pub async fn watch_driving(&self, robot: &str) -> Result<(LiveWatch, EveryStep), HostingError> {
         Ok((self.watch_as(Some(robot.into())).await?, self.stage.feed.every_step()))
     }
@@ -329,7 +329,8 @@ impl EpisodeThread {
         self.close_for(false).await
     }
 
-    /// Does the same as [`EpisodeThread::close`] for an episode that will be brought back.
+    /// Does the same as [`EpisodeThread::close`], but keeps the journal, so that the episode can be resumed
+    /// later.
     pub async fn leave(&self) -> Result<ResultReply, HostingError> {
         self.close_for(true).await
     }

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::hosting::HostingError;
 
-/// Maximum number of calls that may wait for one episode. A policy needs only one place; the others absorb
-/// bursts.
+/// Maximum number of calls that may wait for one episode. A policy makes one call at a time; the remaining
+/// capacity absorbs bursts.
 pub const WAITING_CALLS: usize = 16;
 
 /// Sending end of the queue.

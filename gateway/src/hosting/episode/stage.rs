@@ -19,7 +19,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Surroundings {
     pub folder: RunFolder,
-    /// One of the server's places for episodes, released when the episode is closed.
+    /// Permit for one of the server's episodes, released when the episode is closed.
     pub place: OwnedSemaphorePermit,
     pub metrics: Arc<Metrics>,
     pub memory: Arc<dyn HostMemory>,
@@ -52,7 +52,7 @@ pub struct Stage {
     pub metrics: Arc<Metrics>,
     pub status: SharedStatus,
     pub feed: LiveFeed,
-    /// The episode's place among the server's episodes; `None` once it is released.
+    /// Permit for one of the server's episodes; `None` once it is released.
     pub place: Mutex<Option<OwnedSemaphorePermit>>,
     pub memory: Arc<dyn HostMemory>,
     /// Folder of the journals; `None` for an episode without a journal.
@@ -79,7 +79,7 @@ impl Stage {
         }
     }
 
-    /// Removes the journal of a suspended episode, which will not be brought back.
+    /// Removes the journal of a suspended episode, so that the episode cannot be restored.
     pub fn forget_journal(&self) -> Result<(), HostingError> {
         let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
             return Ok(());

@@ -28,7 +28,7 @@ const STACK_BYTES: usize = 8 << 20;
 pub enum Opening {
     /// The episode begins.
     New { clock: Clock, started: oneshot::Sender<Result<Briefing, EpisodeError>> },
-    /// The episode is brought back; `thinking` is the time since its policy was last answered.
+    /// The episode is restored from its journal. `thinking` is the time since the last answer to the policy.
     Again { thinking: Duration },
 }
 
@@ -49,7 +49,7 @@ fn play(stage: &Arc<Stage>, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     let desk = match opening {
         Opening::New { clock, started } => match stage.begin(clock) {
             Ok((session, briefing)) => {
-                // A caller that went away during the start has dropped the other end of the inbox, and
+                // If the caller has disconnected during the start, the sender of the inbox is dropped and
                 // `work` returns.
                 let _ = started.send(Ok(briefing));
                 Desk::new(stage.clone(), session, None)
@@ -73,7 +73,7 @@ fn play(stage: &Arc<Stage>, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     };
     let Left::Closed(closed) = desk.work(inbox) else { return };
     stage.feed.close();
-    // The place is released before the caller receives the result, so that the caller can start the next
+    // The permit is released before the caller receives the result, so that the caller can start the next
     // episode.
     stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some((reply, result)) = closed {

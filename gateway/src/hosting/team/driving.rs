@@ -24,7 +24,7 @@ use super::{
 };
 use crate::hosting::{Answer, HostingError};
 
-/// Number of answers that a page may lag behind.
+/// Maximum number of answers queued for a page.
 const KEPT_ANSWERS: usize = 64;
 
 /// A person's real-time control of robots. Dropping the value releases the robots.
@@ -139,7 +139,7 @@ async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool
         own.under_way = None;
         if let Some(teleoperation) = &own.teleoperation {
             for answer in answers {
-                // A page that does not read its answers misses some.
+                // A page that does not read its answers in time misses some of them.
                 let _ = teleoperation.answers.try_send(answer);
             }
         }

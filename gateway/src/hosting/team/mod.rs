@@ -125,7 +125,7 @@ impl Team {
         self.round().is_busy()
     }
 
-    /// Returns true if operators may talk.
+    /// Returns true if operators may send messages to each other.
     pub fn may_talk(&self) -> bool {
         self.talk
     }
@@ -136,7 +136,7 @@ impl Team {
         drop(self.round().begin());
     }
 
-    /// Returns true while a partner still has to be brought back.
+    /// Returns true while a partner of the previous server still has to be restored.
     pub fn misses_partners(&self) -> bool {
         self.round().operators.iter().any(|operator| operator.left.is_some())
     }

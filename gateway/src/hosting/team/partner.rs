@@ -26,7 +26,8 @@ use crate::hosting::{EpisodeThread, HostingError};
 const PAUSE_STEPS: u32 = 25;
 
 impl OperatorHandle {
-    /// Lets the expert of the task drive the robot until the episode ends or everybody else has finished.
+    /// Starts the expert of the task, which drives the robot until the episode ends or all other operators
+    /// have finished.
     ///
     /// The expert uses privileged information. The recording and the results state this. Repeated requests
     /// have no effect.
@@ -45,8 +46,8 @@ impl OperatorHandle {
         Ok(())
     }
 
-    /// Lets `policy` drive the robot until the episode ends or everybody else has finished. Returns when the
-    /// policy is connected.
+    /// Starts `policy`, which drives the robot until the episode ends or all other operators have finished.
+    /// Returns when the policy is connected.
     ///
     /// The policy receives the inputs that its map names for all robots. Repeated requests have no effect
     /// while it drives. After a lost connection, a new request connects it again.

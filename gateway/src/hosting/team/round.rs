@@ -1,4 +1,4 @@
-//! The state of a round: the commands that operators have given for the next step.
+//! State of a round: the operators and the commands that they have given for the next step.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
-/// Maximum number of unread messages for one operator.
+/// Maximum number of unread messages per operator.
 const MAX_UNHEARD: usize = 32;
 
 /// State of the operators before a step.
@@ -264,7 +264,7 @@ impl Round {
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }
 
-    /// Refuses a message that would exceed `MAX_UNHEARD` for one of its recipients.
+    /// Returns an error if a message would exceed `MAX_UNHEARD` for one of its recipients.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
         match self.others(from).find(|other| other.heard.len() >= MAX_UNHEARD) {
             Some(other) => {
@@ -372,13 +372,13 @@ impl Operator {
         }
     }
 
-    /// Counts a message that this operator has sent, and returns the number of its earlier messages.
+    /// Counts a message that this operator has sent, and returns the number of messages sent before it.
     pub fn count_said(&mut self) -> u32 {
         self.said += 1;
         self.said - 1
     }
 
-    /// Takes the unread messages.
+    /// Takes the operator's unread messages.
     pub fn take_heard(&mut self) -> Vec<Heard> {
         std::mem::take(&mut self.heard)
     }
