@@ -111,9 +111,9 @@ impl Answer {
         Answer { heard, ..self }
     }
 
-    /// Reports partners as active that acted in an earlier part of a command and fell silent only in its last
-    /// part. Two operators that wait for each other then both receive this report, whichever command ends
-    /// first.
+    /// Reports as active those partners that acted in an earlier part of a command and fell silent only in
+    /// its last part. Two operators that wait for each other then both receive this report, whichever command
+    /// ends first.
     pub fn with_partners_before(mut self, before: Vec<Partner>) -> Answer {
         for earlier in before.into_iter().filter(|earlier| earlier.did == PartnerDid::Acted) {
             let silent = self

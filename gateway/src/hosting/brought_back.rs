@@ -1,4 +1,5 @@
-//! Restoring of episodes of a server that has ended, or of other servers on the same runs folder.
+//! Restoration of episodes that belong to a server that has ended or to other servers on the same runs
+//! folder.
 //!
 //! The episodes are found by their journals and stay suspended until a request needs them. This module also
 //! suspends episodes that stay idle for long.
@@ -21,8 +22,8 @@ use super::{
     team::{Team, TeamRules, seat_again},
 };
 
-/// Number of running episodes up to which none is suspended, however long it is idle. Each takes some
-/// megabytes.
+/// Number of running episodes up to which no episode is suspended, however long it is idle. Each episode
+/// takes some megabytes.
 const MAX_AWAKE: usize = 96;
 
 /// Number of executed control steps per second of idle time before an episode may be suspended. This idle
@@ -172,8 +173,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Removes suspended episodes from the table that other servers have taken over or ended. Call it every
-    /// few seconds.
+    /// Removes from the table the suspended episodes that other servers have taken over or ended. Call it
+    /// every few seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {

@@ -1,7 +1,7 @@
 //! Journal file of an episode: a heading line, then one line for each group of calls that were answered
 //! together.
 //!
-//! An incomplete line is ignored, so an action is never recorded without its answer.
+//! An incomplete line is ignored, so an action and its answer are either both recorded or both missing.
 
 use std::{
     error::Error,
@@ -58,8 +58,8 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// A line of a journal: requests that were answered together, those answers and notes that have an
-/// idempotency key, and the host's memory if it has changed.
+/// A line of a journal: requests that were answered together, the answers and notes with an idempotency key,
+/// and the host's memory if it has changed.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

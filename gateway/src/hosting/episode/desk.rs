@@ -27,7 +27,7 @@ pub type Outcome<T> = Result<T, HostingError>;
 /// Sender of an episode's result to the caller that requested the end.
 pub type ResultSender = oneshot::Sender<Outcome<ResultReply>>;
 
-/// A session and the journal in which its calls are written.
+/// A session and the journal to which its calls are written.
 pub struct Desk {
     stage: Arc<Stage>,
     session: PanicGuard,

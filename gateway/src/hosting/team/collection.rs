@@ -16,7 +16,7 @@ use crate::token::{Token, TokenError};
 pub struct Collection {
     seats: Vec<(Token, OperatorToken)>,
     progress: Mutex<CollectionProgress>,
-    /// Notified when a person has marked the last episode.
+    /// Notified when a person has marked the episode that was played last.
     marked: Condvar,
 }
 
@@ -25,7 +25,7 @@ pub struct Collection {
 pub struct CollectionProgress {
     /// Current activity of the people.
     pub stage: CollectionStage,
-    /// Episode that is being played, or the last one.
+    /// Episode that is being played, or otherwise the episode that was played last.
     pub episode: Option<CollectedEpisode>,
     /// Number of planned episodes.
     pub planned: usize,
@@ -33,7 +33,7 @@ pub struct CollectionProgress {
     pub good: usize,
     /// Number of episodes since this server started that a person marked bad.
     pub bad: usize,
-    /// Marks of the current episode by seat: true for good, `None` before the person has marked.
+    /// Marks of `episode` by seat: true for good, false for bad, `None` before the person has marked it.
     pub marks: Vec<Option<bool>>,
 }
 
@@ -112,7 +112,7 @@ impl Collection {
         self.lock().clone()
     }
 
-    /// Begins to play `episode`.
+    /// Makes `episode` the episode that is being played, and clears the marks.
     pub fn begin(&self, episode: CollectedEpisode) {
         let mut progress = self.lock();
         progress.stage = CollectionStage::Playing;

@@ -88,7 +88,7 @@ pub struct OperatorMemory {
 pub enum Others {
     /// At least one other operator plays.
     There,
-    /// All other operators are silent or have finished.
+    /// All other operators are silent or have finished, and at least one is silent.
     Away,
     /// All other operators have finished.
     Gone,

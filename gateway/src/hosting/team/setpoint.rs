@@ -79,7 +79,7 @@ impl Teleoperation {
         Teleoperation { driver, answers, request, requested: Instant::now(), last: hold }
     }
 
-    /// Sets from `request` if time may pass, and adds its single steps.
+    /// Copies `go` from `request` and adds the single steps of `request` to those left.
     pub fn pass_time(&mut self, request: &DriverRequest) {
         self.requested = Instant::now();
         self.request.go = request.go;
