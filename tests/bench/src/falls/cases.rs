@@ -83,8 +83,8 @@ const AT_DOOR_M: [f32; 2] = [-0.28, -0.25];
 const REACHING_RAD: [f32; ARM_JOINTS] = [-0.35, -0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const HINGE: &str = "hinge";
 const OPEN_RAD: f64 = 1.2;
-/// Time at which the door is released, and its push: at its edge, at the height of the hand, as by a
-/// person in a hurry.
+/// Time at which the door is slammed, its initial speed, and the force at the point `EDGE_M` on its edge at
+/// the height of the hand. A person in a hurry pushes a door like this.
 const SHUTS_AFTER_S: f32 = 1.5;
 const SLAM_RAD_S: f64 = 3.0;
 const SHUTTING_N: f32 = 40.0;

@@ -14,7 +14,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(examples.join(name)).expect("an example")
 }
 
-/// Applies the changes to the text. Each text to replace must occur exactly once.
+/// Applies the replacements to the text. Each text to replace must occur.
 #[track_caller]
 fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
     changes.iter().fold(text.to_string(), |text, (from, to)| {
@@ -23,7 +23,7 @@ fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
     })
 }
 
-/// Returns the walker's MJCF without the lines that contain a word, and with two lines exchanged on each side.
+/// Returns the walker's MJCF with the lines of two joints exchanged on each side.
 fn exchanged(first: &str, second: &str) -> String {
     let mut lines: Vec<String> = text("walker.xml").lines().map(str::to_string).collect();
     for side in ["l", "r"] {
@@ -114,7 +114,8 @@ fn legs_bend_whichever_way_their_motors_turn() {
     check_survives(&turned, "forward_0.4");
 }
 
-/// Without an ankle's roll, a foot rolls on the middle of its sole, as on this edge.
+/// Without a roll joint in the ankle, the foot rolls about the midline of its sole. The capsule has this
+/// shape.
 #[test]
 fn a_robot_whose_ankles_do_not_roll_stands_and_walks() {
     let mjcf = without(&text("walker.xml"), &["joint name=\"roll_"]);

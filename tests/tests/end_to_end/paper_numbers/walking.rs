@@ -1,4 +1,5 @@
-//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks with walking.
+//! Tests of phases on both sides of every published threshold, in modified worlds, for the tasks with
+//! walking.
 
 use std::f32::consts::FRAC_PI_2;
 
