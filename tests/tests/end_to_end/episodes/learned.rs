@@ -113,7 +113,7 @@ fn every_form_says_the_same() {
         let depth_m = half(u16::from_le_bytes([depth[at], depth[at + 1]]));
         let row: DepthRow = serde_json::from_value(row.clone()).expect("a row");
         let expected_m = along_axis_m(&camera, row.point_m().expect("a point"));
-        // Rows are rounded to the millimetre.
+        // The positions in these rows are rounded to the millimetre.
         assert!((depth_m - expected_m).abs() < 1e-3 * expected_m + 0.001, "{depth_m} {expected_m}");
     }
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();

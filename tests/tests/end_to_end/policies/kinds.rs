@@ -130,7 +130,7 @@ rows = 15
 rate_hz = 15
 delta = ["left_wrist_yaw_joint"]
 "#;
-/// Index of this joint among the columns of a row, and among the joints of a state.
+/// Index of the left wrist yaw joint among the columns of a row; `WRIST_JOINT` is its index in a state.
 const WRIST_COLUMN: usize = 6;
 const WRIST_JOINT: usize = 21;
 

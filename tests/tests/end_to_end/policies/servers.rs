@@ -14,12 +14,12 @@ use super::{
     plans::{last_angles_rad, plan, play},
 };
 
-/// Index of the wrists' last joints among the 43 of a state.
+/// Indices of the wrists' last joints among the 43 joints of a state.
 const LEFT_WRIST: usize = 21;
 const RIGHT_WRIST: usize = 35;
 /// Words that occur only in A's instruction.
 const WORDS_OF_A: &str = "Take the bottle";
-/// Index of the same joints in an action row.
+/// Indices of the same joints in an action row.
 pub const LEFT_WRIST_COLUMN: usize = 6;
 const RIGHT_WRIST_COLUMN: usize = 13;
 

@@ -130,7 +130,7 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
         assert!(text.contains("run the same command again: of 4 episodes 0 are played and kept"), "{text}");
     }
 
-    // Observers of the run learn the reason for its wait.
+    // The progress of the run includes the reason for its wait.
     let slow = PolicyMap { connect_s: 1.5, ..fast.clone() };
     let url = format!("ws://{}", nowhere());
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![url.clone()], slow);
