@@ -46,7 +46,7 @@ enum CliCommand {
 }
 
 impl Cli {
-    /// Parses the command line of the process. An invalid one prints an error and ends the process.
+    /// Parses the command line of the process. If it is invalid, prints an error and ends the process.
     pub fn read() -> Cli {
         Cli::try_parse().unwrap_or_else(|error| with_advice(error).exit())
     }
@@ -78,7 +78,7 @@ impl Cli {
     }
 }
 
-/// Adds advice to an error that names another server's flag.
+/// Adds advice to an error about `--port`, a flag that other servers have.
 fn with_advice(mut error: clap::Error) -> clap::Error {
     if error.get(ContextKind::InvalidArg) == Some(&ContextValue::String("--port".into())) {
         let advice = StyledStr::from("the port is a part of --listen, as in --listen 127.0.0.1:8701");

@@ -10,15 +10,15 @@ use foxglove::{
 };
 use tandem_episodes::{LiveChannel, LiveRecording, LiveViewer};
 
-/// Messages that wait for a slow client before the oldest are dropped: about 40 s of an episode, which a
-/// long command plays at once.
+/// Maximum number of messages queued for a slow client, after which the oldest are dropped. It covers about
+/// 40 s of an episode, because a long command sends its messages in one burst.
 const MAX_WAITING_MESSAGES: usize = 16_384;
 
-/// Schema of shapes. A client needs all messages of this schema to draw the present scene, and not only the
-/// latest.
+/// Schema of shapes. A client needs all messages of this schema, not only the latest, to draw the current
+/// scene.
 const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
 
-/// Server of the recording that began last, for clients of Foxglove. Clones share it.
+/// Server that streams the recording that began last to Foxglove clients. Clones share the server.
 #[derive(Clone)]
 pub struct FoxgloveServer(Arc<Shared>);
 
@@ -32,7 +32,7 @@ struct Shared {
 /// The recording that is shown.
 #[derive(Default)]
 struct Shown {
-    /// Number of the recording; every recording that begins gets the next one.
+    /// Number of the recording, counted from 1.
     number: u64,
     time_ns: u64,
     channels: Vec<ShownChannel>,
@@ -41,12 +41,13 @@ struct Shown {
 struct ShownChannel {
     channel: Arc<RawChannel>,
     is_scene: bool,
-    /// Messages for clients that subscribe later, with their times: all of the scene, and the latest of
-    /// every other channel, because physics is often paused.
+    /// Messages for clients that subscribe later, with log times in nanoseconds: all messages of a scene
+    /// channel, and the latest message of any other channel. Physics is often paused, so no new message may
+    /// follow.
     kept: Vec<(u64, Vec<u8>)>,
 }
 
-/// One recording, until the next one begins.
+/// A recording that is shown until the next one begins.
 struct ShownRecording {
     server: FoxgloveServer,
     number: u64,
@@ -59,17 +60,18 @@ impl fmt::Debug for FoxgloveServer {
 }
 
 impl FoxgloveServer {
-    /// Creates a server on a port of this machine alone, since clients need no token; 0 picks a free one.
+    /// Creates a server for a port of the loopback interface, because clients need no token. Port 0 picks a
+    /// free one.
     pub fn on(port: u16) -> FoxgloveServer {
         let (server, shown) = (OnceLock::new(), Mutex::default());
         FoxgloveServer(Arc::new(Shared { port, context: Context::new(), server, shown }))
     }
 
-    /// Begins to serve clients on the present Tokio runtime, and logs the URL that Foxglove opens.
+    /// Begins to serve clients on the current Tokio runtime, and logs the URL to open in Foxglove.
     ///
     /// # Errors
     ///
-    /// If the port cannot be used.
+    /// Returns an error if the port cannot be used.
     pub async fn serve(&self) -> io::Result<()> {
         let port = self.0.port;
         let served = WebSocketServer::new()
@@ -84,7 +86,7 @@ impl FoxgloveServer {
             io::Error::other(format!("cannot serve Foxglove on port {port}: {error}; try --foxglove 0"))
         })?;
         tracing::info!("Foxglove shows episodes from ws://{}:{}", Ipv4Addr::LOCALHOST, server.port());
-        // The settings are served once, so there is no server yet.
+        // `serve` is called once per process, so no server is set yet.
         let _ = self.0.server.set(server);
         Ok(())
     }
@@ -95,14 +97,14 @@ impl FoxgloveServer {
 }
 
 impl LiveViewer for FoxgloveServer {
-    /// Shows a new recording, which replaces the one before.
+    /// Shows a new recording in place of the previous one.
     fn begin(&self) -> Box<dyn LiveRecording> {
         let (number, before) = {
             let mut shown = self.shown();
             let number = shown.number + 1;
             (number, mem::replace(&mut *shown, Shown { number, ..Shown::default() }))
         };
-        // Closing a channel calls its clients, and these may be requesting messages at the same time.
+        // The lock is released first: closing a channel calls its clients, which may be requesting messages.
         before.channels.iter().for_each(|shown| shown.channel.close());
         if let Some(server) = self.0.server.get() {
             server.clear_session(None);

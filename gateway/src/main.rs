@@ -6,8 +6,8 @@ use mimalloc::MiMalloc;
 use tandem::cli::Cli;
 use tandem_episodes::printable;
 
-/// Allocator of the binary. With thousands of held episodes, calls are faster than with the C library's
-/// few heaps. Fifty episodes take 0.5 GB, and 1.3 GB with huge pages.
+/// Allocator of the binary. With thousands of episodes in memory, calls are faster than with the C library's
+/// allocator, which has few heaps. Fifty episodes take 0.5 GB, or 1.3 GB with huge pages.
 #[global_allocator]
 static ALLOCATOR: MiMalloc = MiMalloc;
 
@@ -30,7 +30,7 @@ fn end_with_reader() {
 fn main() -> ExitCode {
     end_with_reader();
     Cli::read().run().unwrap_or_else(|error| {
-        // Errors quote text from files and foreign servers.
+        // Errors quote text from files and other servers, which may contain control characters.
         eprintln!("tandem: {}", printable(&error.to_string()));
         ExitCode::FAILURE
     })

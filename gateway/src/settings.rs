@@ -1,4 +1,4 @@
-//! Settings. Flags precede the environment (`TANDEM_*`), then a TOML file, then defaults.
+//! Settings. Flags take precedence over the environment (`TANDEM_*`), then a TOML file, then defaults.
 
 mod check;
 mod durability;
@@ -33,7 +33,8 @@ pub use durability::Durability;
 pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
-/// One source of settings; missing ones come from the next source. The doc comments are help texts.
+/// One source of settings. Missing settings come from the next source. The doc comments are help texts of the
+/// command line.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
@@ -56,7 +57,7 @@ pub struct Layer {
     /// [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// The token itself. It is never a flag, which the process list would show, nor a line of the
+    /// The token itself. It can be neither a flag, because the process list would show it, nor a line of the
     /// settings file.
     #[arg(skip)]
     #[serde(skip)]
@@ -212,7 +213,7 @@ impl Layer {
         }
     }
 
-    /// Returns these settings, with missing ones from the file at `config`.
+    /// Returns these settings, with missing settings filled in from the file at `config`.
     pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
         Ok(self.or(read_layer(config)?))
     }
@@ -222,7 +223,8 @@ impl Layer {
         self.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)))
     }
 
-    /// Returns the given token. None is needed if only this machine can reach the address.
+    /// Returns the token, if one is given. A token is required unless only this machine can reach the
+    /// address.
     pub fn find_token(&self) -> Result<Option<Token>, SettingsError> {
         let token = match (&self.token_file, &self.token) {
             (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
@@ -255,7 +257,7 @@ impl Layer {
         Ok(TaskSet::with_files(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
     }
 
-    /// Reads the instructions from the file for these tasks. Without a file, the tasks' own apply.
+    /// Reads the instructions for `tasks` from the file. Without a file, the instructions in the tasks apply.
     pub fn read_instructions(&self, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
         let path = self.instructions.as_deref();
         path.map_or_else(|| Ok(Instructions::default()), |path| Instructions::read(path, tasks))
@@ -266,12 +268,12 @@ impl Layer {
         read_robot(self.robot.as_deref())
     }
 
-    /// Returns the base controller; its file is not read yet.
+    /// Returns the base controller, whose file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.locomotion.as_deref())
     }
 
-    /// Returns the robots' sensing of their own state.
+    /// Returns the state estimator and sensor model of the robots.
     pub fn sensing(&self) -> Sensing {
         Sensing {
             state_estimate: self.state_estimate.unwrap_or_default(),
@@ -300,7 +302,7 @@ impl Layer {
 pub struct Settings {
     /// Address to serve on; port 0 picks a free one.
     pub listen: SocketAddr,
-    /// Names of the server besides its address and localhost.
+    /// Host names of the server besides its address and localhost.
     pub allowed_hosts: Vec<String>,
     /// Certificate for HTTPS; `None` for plain HTTP.
     pub certificate: Option<Certificate>,
@@ -314,19 +316,19 @@ pub struct Settings {
     pub foxglove: Option<FoxgloveServer>,
     /// Tasks that can be played.
     pub tasks: TaskSet,
-    /// Instructions in place of the tasks' own.
+    /// Instructions that replace those of the tasks.
     pub instructions: Instructions,
-    /// Scene in place of the tasks' own.
+    /// Scene that replaces those of the tasks.
     pub scene: Option<SceneFile>,
     /// Description of the robots.
     pub robot: RobotFile,
     /// The base controller of every robot.
     pub locomotion: Controller,
-    /// The robots' sensing of their own state.
+    /// State estimator and sensor model of the robots.
     pub sensing: Sensing,
     /// Stress of every episode.
     pub stress: Option<Stress>,
-    /// Velocity limits of that controller.
+    /// Velocity limits of the base controller.
     pub base_limits: BaseLimits,
     /// Renderer of camera images.
     pub renderer: RendererKind,
@@ -338,30 +340,30 @@ pub struct Settings {
     pub disclosure: Disclosure,
     /// Hints on grasping in policies' texts.
     pub hints: Hints,
-    /// Limit on thinking time in seconds; `None` for the protocol's own.
+    /// Limit on a policy's thinking time in seconds; `None` for the limit of the protocol.
     pub thinking_limit_s: Option<u32>,
     /// Maximum number of episodes held at once.
     pub max_episodes: u32,
     /// Maximum size of a request body in bytes.
     pub max_body_bytes: usize,
-    /// Time limit for a header, and for a body as well.
+    /// Time limit for receiving a request's header, and again for its body.
     pub request_timeout: Duration,
     /// Maximum number of concurrent requests.
     pub max_requests: usize,
-    /// Maximum number of requests per second of one address, if limited.
+    /// Maximum number of requests per second from one address; `None` for no limit.
     pub rate_limit: Option<u32>,
-    /// Time after its last call when an episode counts as abandoned.
+    /// Time without a call after which an episode counts as abandoned.
     pub idle_timeout: Duration,
     /// Time limit for closing the episodes at shutdown.
     pub stop_timeout: Duration,
     /// Durability of a call before it is answered.
     pub durability: Durability,
-    /// URL for other servers, if it differs from the address.
+    /// URL at which other servers and their clients reach this server; `None` if it is the address.
     pub advertised_url: Option<String>,
 }
 
 impl Settings {
-    /// Returns the choice of texts for policies.
+    /// Returns the wording of the texts for policies.
     pub fn wording(&self) -> Wording {
         Wording { hints: self.hints, ..self.assistance.into() }
     }
@@ -449,7 +451,8 @@ impl Settings {
     }
 }
 
-/// Parses a flag that takes the name of one of `all`. `--help` and errors list the names.
+/// Returns a parser for a flag whose value is the name of an element of `all`. `--help` and errors list the
+/// names.
 pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
@@ -465,7 +468,7 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
 }
 
-/// Reads a task's file and tries the task. Problems that may be intended are logged.
+/// Reads a task file and checks the task with seed 0. Logs problems that may be intended.
 pub fn read_task_file(path: &Path) -> Result<Task, SettingsError> {
     let task = read_task(path)?;
     let check = check_task(&task, &[FIRST_SEED], None)
@@ -474,7 +477,7 @@ pub fn read_task_file(path: &Path) -> Result<Task, SettingsError> {
     Ok(task)
 }
 
-/// Seed of the trial.
+/// Seed with which a task file is checked.
 const FIRST_SEED: u32 = 0;
 
 /// Reads a scene, and logs where its file deviates from MuJoCo.

@@ -1,5 +1,4 @@
-//! Bearer tokens, which only permitted callers know. They are compared in constant time and never
-//! printed.
+//! Bearer tokens of permitted callers. Tokens are compared in constant time and their text is never logged.
 
 use std::{
     env,
@@ -18,7 +17,7 @@ const MAX_LENGTH: usize = 256;
 /// Maximum size of a token file in bytes.
 const MAX_FILE_BYTES: u64 = 64 << 10;
 
-/// Minimum length in bytes; a shorter token could be guessed.
+/// Minimum length of a token in bytes; a shorter token could be guessed.
 const MIN_LENGTH: usize = 16;
 
 /// Number of random bytes in a generated token: 160 bits.
@@ -36,10 +35,10 @@ pub enum TokenError {
     Read {
         /// Path of the file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The text does not have the form of a token.
+    /// The text is not a well-formed token.
     #[error(
         "the token of {place} has to be {MIN_LENGTH} to {MAX_LENGTH} letters, digits and signs without \
          spaces; `openssl rand -hex 32` makes one"
@@ -48,7 +47,7 @@ pub enum TokenError {
         /// Source of the text.
         place: String,
     },
-    /// A setting is empty, so the user would wrongly expect a protected server.
+    /// The setting is empty. It is refused, because the user would wrongly expect a protected server.
     #[error(
         "{setting} is set and empty; give a token by it (`openssl rand -hex 32` makes one), or unset it for \
          a server without"
@@ -57,7 +56,7 @@ pub enum TokenError {
         /// Name of the setting.
         setting: &'static str,
     },
-    /// The system has no random numbers.
+    /// The operating system provides no random numbers.
     #[error("no random numbers for a token: {0}")]
     Random(getrandom::Error),
 }
@@ -75,11 +74,11 @@ impl Token {
         if text.is_empty() {
             return Err(TokenError::Empty { setting: TOKEN_VARIABLE });
         }
-        // Invalid UTF-8 becomes characters that no token has, so it is refused.
+        // Invalid UTF-8 becomes a replacement character, which no token has, so the text is refused.
         Token::parse(&text.to_string_lossy(), TOKEN_VARIABLE)
     }
 
-    /// Reads the token from a file, without surrounding white space.
+    /// Reads the token from a file and removes surrounding white space.
     pub fn read(path: &Path) -> Result<Token, TokenError> {
         let text = read_text(path, MAX_FILE_BYTES)
             .map_err(|source| TokenError::Read { path: path.into(), source })?;
@@ -89,7 +88,7 @@ impl Token {
         Token::parse(text.trim(), &path.display().to_string())
     }
 
-    /// Parses the token `text`, which was given in `place`.
+    /// Parses the token `text`. Errors name `place` as its source.
     pub fn parse(text: &str, place: &str) -> Result<Token, TokenError> {
         if text.len() < MIN_LENGTH || !is_well_formed(text) {
             return Err(TokenError::Form { place: place.into() });
@@ -97,7 +96,7 @@ impl Token {
         Ok(padded(text))
     }
 
-    /// Generates a random token. Returns it with its text for the owner.
+    /// Generates a random token, and returns it with its text for the owner.
     pub fn random() -> Result<(Token, String), TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(TokenError::Random)?;

@@ -1,5 +1,5 @@
-//! Shared helpers of the end-to-end tests: a server in this process on a free port, and a client that
-//! returns every response.
+//! Shared helpers of the end-to-end tests: a server in this process on a free port, and a client that returns
+//! every response, including errors.
 
 mod server;
 mod skipped;

@@ -19,14 +19,14 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Returns the body of a response that must be a success.
+    /// Returns the body of a response, which must be a success.
     #[track_caller]
     pub fn ok(self) -> Value {
         assert!((200..300).contains(&self.status), "{self:?}");
         self.body
     }
 
-    /// Returns a header; empty if it is absent.
+    /// Returns the value of a header, or an empty string if it is absent.
     pub fn header(&self, name: &str) -> &str {
         self.headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default()
     }
@@ -47,7 +47,7 @@ impl Answer {
     }
 }
 
-/// A server that records into a temporary folder, with room for two episodes.
+/// A server that records into a temporary folder and hosts up to two episodes.
 pub struct TestServer {
     server: Option<Server>,
     settings: Arc<Settings>,
@@ -83,19 +83,19 @@ impl TestServer {
         TestServer { address: server.address(), server: Some(server), settings, runs, agent }
     }
 
-    /// Returns the part after `#` of the link for watching.
+    /// Returns the fragment (after `#`) of the viewers' link.
     pub fn watch_key(&self) -> String {
         let link = self.server.as_ref().expect("a running server").watch_link();
         link.split_once('#').expect("a link with a key").1.into()
     }
 
-    /// Stops the server like SIGTERM.
+    /// Stops the server in the same way as SIGTERM.
     pub fn stop(&mut self) {
         let left = self.server.take().expect("a running server").stop();
         assert!(left.is_empty(), "{left:?} did not end");
     }
 
-    /// Stops the server as SIGTERM does, and starts another on the same folder of runs.
+    /// Stops the server in the same way as SIGTERM, and starts another with the same folder of runs.
     pub fn restart(&mut self, guests: Guests) {
         let left = self.server.take().expect("a running server").stop_keeping();
         assert!(left.is_empty(), "{left:?} did not stop");

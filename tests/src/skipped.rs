@@ -1,13 +1,13 @@
-//! Reports of skipped tests. Rust's test harness cannot skip a test at run time, and it captures the
-//! output of passing tests. This line bypasses the capture, so every run of `cargo test` shows it. Tests
-//! of other crates include this file, too.
+//! Reports of skipped tests. Rust's test harness cannot skip a test at run time, and it captures the output
+//! of passing tests. These reports bypass the capture, so every run of `cargo test` shows them. Tests of
+//! other crates include this file, too.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-/// Printed lines; each is printed once.
+/// Lines already printed; each line is printed only once.
 static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// Reports that the test on this thread skips a check, and the reason.

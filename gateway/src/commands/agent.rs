@@ -90,7 +90,7 @@ pub struct AgentArgs {
     world: WorldFlags,
 }
 
-/// Part of [`AGENT_FILE`] that is read here.
+/// Part of [`AGENT_FILE`] that this program reads.
 #[derive(Debug, Deserialize)]
 struct AgentFile {
     flags: ServerFlags,
@@ -137,7 +137,7 @@ fn play(args: AgentArgs) -> CommandResult {
     play_each(&agent, settings, &text, plays.collect())
 }
 
-/// Resumes the episode of `folder`, which a server on the folder of all runs brings back. Python refuses
+/// Resumes the episode of `folder`, which a server on the parent folder of all runs restores. Python refuses
 /// incompatible flags before the server starts.
 fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     let agent = PythonModule::new(PythonPart::Agent, resumed_arguments(given))?;
@@ -149,19 +149,19 @@ fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     play_each(&agent, Settings::resolve(on_this_machine(layer, token), None)?, &text, vec![Vec::new()])
 }
 
-/// Settings of a server that only this machine can reach.
+/// Returns the settings of a server that only this machine can reach.
 fn on_this_machine(layer: Layer, token: Token) -> Layer {
     Layer { listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()), token: Some(token), ..layer }
 }
 
-/// Returns the given flags of the world in the form in which Python keeps them.
+/// Returns the given flags of the world in the form in which Python stores them.
 fn world_flags(given: &GivenFlags) -> Value {
     let flags = given.of::<WorldFlags>().into_iter();
     flags.map(|(flag, value)| (flag.replace('-', "_"), Value::from(value))).collect::<Map<_, _>>().into()
 }
 
-/// Returns the arguments for Python when an episode is resumed: only the flags that are given, because
-/// defaults may differ from the episode's.
+/// Returns the arguments for Python when an episode is resumed. They contain only the given flags, because
+/// defaults may differ from the flags of the episode.
 fn resumed_arguments(given: &GivenFlags) -> Vec<String> {
     let world = given.of::<WorldFlags>();
     let own = given.of::<AgentArgs>().into_iter().filter(|flag| !world.contains(flag));
@@ -219,8 +219,8 @@ fn exit_code(is_success: bool) -> ExitCode {
     }
 }
 
-/// Forwards the first signal that would end this process to the running child, which then ends its
-/// episode. A second signal ends this process at once.
+/// Forwards the first signal that would end this process to the running child, which then ends its episode. A
+/// second signal ends this process immediately.
 fn hand_on_signals(child: Arc<AtomicU32>) {
     thread::spawn(move || -> io::Result<()> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -235,7 +235,7 @@ fn hand_on_signals(child: Arc<AtomicU32>) {
 fn ask_to_end(id: u32) {
     use rustix::process::{Pid, Signal, kill_process};
     if let Some(pid) = id.try_into().ok().and_then(Pid::from_raw) {
-        // The call fails if the child has ended, which is fine.
+        // The call fails if the child has ended, which is not an error here.
         let _ = kill_process(pid, Signal::TERM);
     }
 }

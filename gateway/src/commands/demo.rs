@@ -1,5 +1,5 @@
-//! `tandem demo`: the gateway in this process, and the scripted expert that plays the Handover task over
-//! real HTTP.
+//! `tandem demo`: the gateway in this process, and the scripted expert that plays the Handover task over real
+//! HTTP.
 
 use std::{
     error::Error,
@@ -83,7 +83,7 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     Ok(results)
 }
 
-/// Returns true if 80 % of the episodes reached the last phase. A single episode has to reach it.
+/// Returns true if at least 80 % of the episodes reached the last phase. A single episode has to reach it.
 pub fn passed(results: &[ResultReply]) -> bool {
     count_last_phase(results) * 100 >= results.len() * PASS_PERCENT
 }
@@ -137,8 +137,7 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
     }
 }
 
-/// The expert's episode: the expert acts over HTTP like any policy, and reads the true state in this
-/// process.
+/// An episode of the expert, which acts over HTTP like any policy and reads the true state in this process.
 struct OverHttp {
     http: HttpEpisode,
     thread: Arc<EpisodeThread>,

@@ -83,8 +83,8 @@ struct LerobotArgs {
     /// Model of the head cameras [default: that of the episode].
     #[arg(long, value_name = "NAME", value_parser = one_of(CameraModel::ALL, CameraModel::name))]
     camera_model: Option<CameraModel>,
-    /// Licence of the data set for its card, by the name that the Hugging Face Hub uses, for example cc-by-4.0
-    /// [default: none, so all rights stay with you].
+    /// Licence of the data set for its card, by the name that the Hugging Face Hub uses, for example
+    /// cc-by-4.0 [default: none, so all rights stay with you].
     #[arg(long, value_name = "NAME")]
     license: Option<String>,
     /// Convert only episodes that reached their last phase.
@@ -99,7 +99,7 @@ struct LerobotArgs {
 }
 
 impl LerobotArgs {
-    /// Returns the arguments for Python, whose flags are the same.
+    /// Returns the arguments for Python, which has the same flags.
     fn arguments(&self) -> Vec<String> {
         let LerobotArgs { runs, out, format, view, cameras, images, codec, size, rate, .. } = self;
         let texts = [

@@ -1,4 +1,4 @@
-//! `tandem import`: files of other programs as MJCF that Tandem reads, which the Python package writes.
+//! `tandem import`: files of other programs, which the Python package converts to MJCF that Tandem reads.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -32,7 +32,7 @@ pub struct ImportArgs {
     decompose: bool,
 }
 
-/// Lets Python write the files, and draws each of them.
+/// Lets Python write the files, and renders a picture of each.
 pub fn run(args: ImportArgs) -> CommandResult {
     let words = args.files.iter().chain([&args.out]).map(|path| path.to_string_lossy().into_owned());
     let words = words.chain(args.decompose.then(|| "--decompose".into())).collect();
@@ -49,7 +49,7 @@ pub fn run(args: ImportArgs) -> CommandResult {
     Ok(if status.success() && all_drawn { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Draws a scene from four sides; `false` if it is refused, which is printed.
+/// Renders a scene from four sides. Returns false if the scene is refused, and prints the reason.
 fn draw(scene: &Path, picture: &Path) -> bool {
     let drawn = draw_sides(scene).map_err(|error| error.to_string());
     let written = drawn.and_then(|png| std::fs::write(picture, png).map_err(|error| error.to_string()));

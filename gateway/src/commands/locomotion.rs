@@ -1,4 +1,4 @@
-//! `tandem locomotion`: the base controller on its own.
+//! `tandem locomotion`: measurements of the base controller alone.
 
 use std::{
     path::{Path, PathBuf},
@@ -54,7 +54,7 @@ enum LocomotionPart {
     },
 }
 
-/// Plays the cases, prints a line per case as it ends and a summary, and writes JSON if a file is named.
+/// Plays the cases, prints a line for each finished case and a summary, and writes JSON if a file is named.
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, motors, sensing, robot, cases, seeds, json } = args.part;
     let robot = match ROBOTS.contains(&robot.as_str()) {

@@ -43,6 +43,7 @@ fn install(default: Targets, format: LogFormat) {
     };
     // The MCP library logs three lines for each line of this program.
     let usual = default.with_target("rmcp", LevelFilter::WARN);
-    // If one process runs several commands, as a Python program may, the log of the first one stays.
+    // If one process runs several commands, for example in a Python program, the log of the first command
+    // remains in use.
     let _ = tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).try_init();
 }

@@ -33,7 +33,8 @@ pub use flags::{Seeds, read_seed_key};
 /// Result of a subcommand. An error is printed and makes the program fail.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
-/// Returns the command line of this process for a shell, without the program's own path.
+/// Returns the command that continues this process's run. If the process was not started as `evaluate` or
+/// `collect`, returns advice to repeat the command.
 fn command_to_go_on() -> String {
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let words: Vec<String> = words.skip_while(|word| word != "evaluate" && word != "collect").collect();
@@ -43,14 +44,14 @@ fn command_to_go_on() -> String {
     }
 }
 
-/// Returns the command that continues what this one has begun, without the flag that deletes results.
+/// Returns the command that continues the run of these `words`, without the flag that deletes results.
 fn going_on(words: &[String]) -> String {
     let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| shell_word(word));
     std::iter::once("tandem".into()).chain(kept).collect::<Vec<_>>().join(" ")
 }
 
-/// Prints a text that other programs may read, without terminal control characters. A reader that has
-/// closed the pipe is no error.
+/// Prints a text that other programs may read, without terminal control characters. A reader that has closed
+/// the pipe is not an error.
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {

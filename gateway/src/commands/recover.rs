@@ -15,7 +15,7 @@ pub struct RecoverArgs {
     partial: PathBuf,
 }
 
-/// Recovers the recording, and prints how much it has.
+/// Recovers the recording, and prints the number of its messages and its duration.
 pub fn run(args: RecoverArgs) -> CommandResult {
     let recovered = tandem_episodes::recover(&args.partial)?;
     println!(

@@ -75,7 +75,7 @@ pub struct ReplayArgs {
     jobs: usize,
 }
 
-/// A size on the command line.
+/// A size given on the command line.
 #[derive(Clone, Copy, Debug)]
 struct SizeFlag(PictureSize);
 
@@ -209,7 +209,7 @@ fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     [assistance.clone()].into_iter().chain(besides).collect::<Vec<_>>().join(", ")
 }
 
-/// Prints the result of the comparison, and returns true if both are the same.
+/// Prints the result of the comparison. Returns true if replay and recording are the same.
 fn print_verified(verified: &Verification) -> bool {
     if let Some(build) = &verified.other_build {
         println!(
@@ -247,8 +247,8 @@ fn print_verified(verified: &Verification) -> bool {
     }
 }
 
-/// Returns the folder for the images of one recording. With several recordings, each has its own, named
-/// like the recording's folder.
+/// Returns the folder for the images of one recording. With several recordings, each has a subfolder with the
+/// name of its episode's folder.
 fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
     let own = recording.parent().and_then(Path::file_name);
     match (recordings, own) {

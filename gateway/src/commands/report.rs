@@ -91,7 +91,7 @@ pub fn run(args: ReportArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Films an episode. If that fails, the report has the reason in its place.
+/// Renders the film of an episode. If that fails, the film contains the reason instead.
 fn film(place: FilmPlace) -> Film {
     let content = place.episode.clone().and_then(|FilmedEpisode { recording, .. }| {
         let read = Recording::read(&recording).map_err(|error| error.to_string())?;

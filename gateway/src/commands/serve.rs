@@ -1,4 +1,4 @@
-//! `tandem serve`: episodes for policies.
+//! `tandem serve`: a server of episodes for policies.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -43,8 +43,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
     try_runs_folder(&settings.runs)?;
     let server =
         Server::start_for(settings, Guests { partner: args.partner.policy()?, ..Guests::default() })?;
-    // The links are secret, so they are not logged. If they cannot be printed, for example on a full
-    // disk, the server runs all the same.
+    // The links are secret, so they are not logged. If they cannot be printed, for example on a full disk,
+    // the server still runs.
     let [start, watch, operate] = [&server.start_link(), server.watch_link(), &server.operate_link()];
     let _ = print(&format!("start at {start}\nwatch at {watch}\noperate at {operate}\n"));
     let left = server.run_until_signal();
@@ -54,8 +54,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
 /// Limits the C library's heaps to the number of processors. The wheel's threads use them; the binary's
 /// do not.
 ///
-/// The default is eight times as many. Each heap keeps the memory between the remains of episodes that
-/// have ended or sleep: gigabytes with thousands of them.
+/// The default is eight times the number of processors. Each heap retains the memory between the remains of
+/// ended or suspended episodes, which is gigabytes after thousands of episodes.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn share_heaps() {
     let heaps = std::thread::available_parallelism()

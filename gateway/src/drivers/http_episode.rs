@@ -45,7 +45,7 @@ pub enum HttpError {
     /// The server was not reached, or its response is not JSON.
     #[error("no reply over HTTP: {0}")]
     Transport(#[from] ureq::Error),
-    /// The reply violates the contract.
+    /// The reply does not match the contract.
     #[error("a reply that the contract does not know: {0}")]
     Contract(#[from] serde_json::Error),
 }

@@ -1,5 +1,5 @@
-//! Handling of signals that end this process during an evaluation: a last message is printed and programs
-//! are stopped first.
+//! Handling of signals that end this process during an evaluation. Before the end, a last message is printed
+//! and programs are stopped.
 
 use std::thread;
 
@@ -9,7 +9,7 @@ use crate::http::shutdown_signal;
 /// Exit status that shells report for a process that SIGINT has ended.
 const INTERRUPTED: i32 = 130;
 
-/// Runs `work`. If a signal ends the process meanwhile, calls `say` and stops the policies' programs
+/// Runs `work`. If a signal ends the process during that time, calls `say` and stops the policies' programs
 /// first.
 pub fn with_last_words<T>(say: impl Fn() + Sync, work: impl FnOnce() -> T) -> T {
     let (working, done) = tokio::sync::oneshot::channel::<()>();

@@ -27,8 +27,8 @@ fn remove_old_result(path: &Path) -> Result<(), PlayError> {
     }
 }
 
-/// Returns the result of an episode that a program has closed in any way. It is the server's own result,
-/// because a program may have written to the episode's folder.
+/// Returns the result of an episode that a program has closed in any way. The result comes from the server,
+/// because the program may have written to the episode's folder.
 fn own_result(episode: &EpisodeThread) -> Result<ResultReply, PlayError> {
     let result = episode.result().cloned();
     result.ok_or_else(|| PlayError::Lost("no result: the episode was not closed in time".into()))

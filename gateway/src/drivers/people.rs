@@ -1,5 +1,4 @@
-//! People as a policy: they drive the robots of one episode after another in browsers, on a server of
-//! their own.
+//! People as a policy: they drive the robots of one episode after another in browsers, on a separate server.
 //!
 //! They mark every episode as good or bad, and bad ones are moved to a separate folder.
 
@@ -28,16 +27,16 @@ use crate::{
     token::Token,
 };
 
-/// Interval between two checks whether an episode has ended.
+/// Interval between checks for the end of an episode.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Time that the others wait for a person who is away: the maximum.
+/// Maximum time that the other robots wait for an absent person.
 const PATIENCE_S: f64 = 600.0;
 
 /// Marker file in the folder of an episode that everybody marked good, for `tandem export lerobot
 /// --only-good`.
 const GOOD_FILE: &str = "good";
-/// File in the folder of a bad episode that names the people who marked it so.
+/// File in the folder of a bad episode. It names the people who marked the episode as bad.
 const BAD_FILE: &str = "bad";
 
 /// People who drive the robots of a collection.
@@ -54,8 +53,8 @@ pub struct People {
 }
 
 impl People {
-    /// Starts a server with an operator for each of `robots`, for the `planned` episodes. Bad ones are moved
-    /// to `aside`.
+    /// Starts a server with an operator for each of `robots`, for the `planned` episodes. Episodes that are
+    /// marked bad are moved to `aside`.
     pub fn start(
         settings: Settings,
         robots: &[&str],
@@ -164,8 +163,7 @@ impl Policy for People {
     }
 }
 
-/// Returns the URL of a server at `address`: with its configured name, or with this machine's address in
-/// the network.
+/// Returns the URL of a server at `address`, with its configured name or with this machine's network address.
 fn base_url(scheme: &str, address: SocketAddr, name: Option<&str>) -> String {
     let port = address.port();
     if let Some(name) = name {
@@ -178,11 +176,11 @@ fn base_url(scheme: &str, address: SocketAddr, name: Option<&str>) -> String {
     format!("{scheme}://{}", SocketAddr::new(ip, port))
 }
 
-/// Returns the address of this machine in the network. Nothing is sent: connecting a UDP socket only
-/// chooses the address.
+/// Returns the network address of this machine. Connecting a UDP socket chooses the address and sends
+/// nothing.
 fn own_address() -> Option<IpAddr> {
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
-    // An address that is reserved for documentation.
+    // This address is reserved for documentation.
     socket.connect("192.0.2.1:9").ok()?;
     socket.local_addr().ok().map(|address| address.ip())
 }

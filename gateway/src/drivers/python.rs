@@ -1,11 +1,12 @@
-//! Parts that only the Python package has, started as separate programs.
+//! Features that only the Python package has. They run as separate programs.
 //!
-//! One is the tool loop of language models, because the vendors' official SDKs are in Python. The other
-//! is data sets, because the libraries of their formats are.
+//! One is the tool loop of language models, because the vendors' official SDKs are in Python. Another is data
+//! sets, because the libraries of their formats are in Python.
 
 use std::{env, io, process::Command};
 
-/// Environment variable that names the interpreter with the package. The command of a wheel sets its own.
+/// Environment variable that names the interpreter with the package. The wheel's command sets it to its own
+/// interpreter.
 const PYTHON_VARIABLE: &str = "TANDEM_PYTHON";
 /// On Windows `python3` is an alias that opens the Microsoft Store.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
@@ -84,7 +85,7 @@ impl PythonPart {
         }
     }
 
-    /// Returns how to get the package with the extra.
+    /// Returns the advice on installing the package with the extra.
     fn remedy(self) -> String {
         let extra = self.extra();
         format!(
@@ -114,7 +115,7 @@ impl PythonPart {
 
 impl PythonModule {
     /// Creates the module with these arguments, after checking that its package and requirements are
-    /// there.
+    /// installed.
     pub fn new(part: PythonPart, arguments: Vec<String>) -> Result<PythonModule, PythonError> {
         let module = PythonModule { python: interpreter(), part, arguments };
         let checked = module.command(&[CHECK]).output();
@@ -140,7 +141,7 @@ impl PythonModule {
         }))
     }
 
-    /// Returns the command of the interpreter, with `further` arguments before the command's own.
+    /// Returns the command of the interpreter. The `further` arguments precede the command's own arguments.
     pub fn command(&self, further: &[&str]) -> Command {
         let mut command = Command::new(&self.python);
         command.args(["-m", self.part.module()]).args(further).args(&self.arguments);

@@ -6,39 +6,39 @@ use tandem_tools_spec::{
     Call, Heard, ManageReply, Observation, Partner, PartnerDid, Presence, StopReason, TalkReply, ToolReply,
 };
 
-/// A tool's reply with the information that goes with every reply.
+/// A tool's reply with the information that accompanies every reply.
 #[derive(Debug, Serialize)]
 pub struct Answer {
     /// The reply.
     #[serde(flatten)]
     pub reply: ToolReply,
-    /// Control steps executed up to now, including the initial hold. Left out of a result, which has its
-    /// own step count.
+    /// Control steps executed up to now, including the initial hold. Omitted from a result, which contains a
+    /// step count.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<u32>,
-    /// Observation after a command that asked for one.
+    /// Observation after a command that requested it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
     /// Behaviour of the other operators' robots during the command.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub partners: Vec<Partner>,
-    /// The other operators at the moment, with a status.
+    /// Current actions of the other operators, only in the answer to a status request.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub presence: Vec<Presence>,
     /// Messages from the other operators.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub heard: Vec<Heard>,
-    /// Reason why the recording is incomplete. Left out when it is complete, and when the reply itself
-    /// has the reason.
+    /// Reason why the recording is incomplete. Omitted if the recording is complete or the reply itself
+    /// contains the reason.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
-    /// True once the operator has left an episode that others still play; its result is not known yet.
+    /// True once the operator has finished while others still play, so that the episode has no result yet.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub others_play_on: bool,
 }
 
 impl Answer {
-    /// Wraps `reply`, a reply of `session`.
+    /// Adds the information from `session` to its reply `reply`.
     pub fn new(reply: CallReply, session: &Session) -> Answer {
         let CallReply { reply, observation } = reply;
         let is_result = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
@@ -72,14 +72,14 @@ impl Answer {
         self
     }
 
-    /// Sets the seconds that an operator may still think.
+    /// Sets the thinking time in seconds that the operator has left.
     pub fn with_clock_left(mut self, left_s: Option<f64>) -> Answer {
         let budget = match &mut self.reply {
             ToolReply::Act(reply) => &mut reply.budget,
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 &mut status.budget
             }
-            // The last reply of a plan has it already.
+            // The last reply of a plan already contains the time.
             ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {
                 return self;
             }
@@ -88,7 +88,7 @@ impl Answer {
         self
     }
 
-    /// Returns the executed control steps of a command that a partner's command cut off.
+    /// Returns the number of executed control steps if a partner's shorter command ended this command early.
     pub fn cut_off_steps(&self) -> Option<u32> {
         match &self.reply {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::PartnerDone => {
@@ -102,7 +102,7 @@ impl Answer {
         }
     }
 
-    /// Combines this answer, which is for the last part of a command, with the earlier parts.
+    /// Adds the steps and messages of a command's earlier parts to this answer, which is for its last part.
     pub fn after(mut self, steps_before: u32, heard_before: Vec<Heard>) -> Answer {
         if let ToolReply::Act(reply) = &mut self.reply {
             reply.executed_steps += steps_before;
@@ -111,8 +111,9 @@ impl Answer {
         Answer { heard, ..self }
     }
 
-    /// Reports the earlier behaviour of partners that fell silent only in the last part of a command. Two
-    /// operators that wait for each other then both learn of it, whichever ends first.
+    /// Reports as active those partners that acted in an earlier part of a command and fell silent only in
+    /// its last part. Two operators that wait for each other then both receive this report, whichever command
+    /// ends first.
     pub fn with_partners_before(mut self, before: Vec<Partner>) -> Answer {
         for earlier in before.into_iter().filter(|earlier| earlier.did == PartnerDid::Acted) {
             let silent = self
@@ -138,19 +139,19 @@ impl Answer {
     }
 }
 
-/// A call that was refused before it reached its episode, in the form in which it arrived.
+/// A call that was refused before it reached its episode, as received.
 #[derive(Debug, Clone)]
 pub struct RefusedCall {
-    /// Tool name as received; it may be no tool's name.
+    /// Tool name as received; possibly not the name of a tool.
     pub tool: String,
-    /// Arguments as received; they may be no JSON.
+    /// Arguments as received; possibly not valid JSON.
     pub arguments: String,
     /// Reason for the refusal.
     pub problem: String,
 }
 
 impl RefusedCall {
-    /// Copies a call that may be refused later; the reason is still empty.
+    /// Copies a call that may be refused later, with an empty reason.
     pub fn of(call: &Call) -> RefusedCall {
         let arguments = serde_json::to_string(call).unwrap_or_default();
         RefusedCall { tool: call.name().into(), arguments, problem: String::new() }

@@ -1,7 +1,8 @@
-//! Episodes of a server that has ended, or of other servers on the same runs folder.
+//! Restoration of episodes that belong to a server that has ended or to other servers on the same runs
+//! folder.
 //!
-//! They are found by their journals and sleep until a request needs them. Episodes that stay idle for long
-//! are suspended here as well.
+//! The episodes are found by their journals and stay suspended until a request needs them. This module also
+//! suspends episodes that stay idle for long.
 
 use std::{
     fs,
@@ -21,16 +22,16 @@ use super::{
     team::{Team, TeamRules, seat_again},
 };
 
-/// Maximum number of episodes kept awake, regardless of how long they have been idle. Each takes some
-/// megabytes.
+/// Number of running episodes up to which no episode is suspended, however long it is idle. Each episode
+/// takes some megabytes.
 const MAX_AWAKE: usize = 96;
 
-/// An episode may be suspended after one idle second for each of these control steps. That is ten times as
-/// long as bringing it back takes.
+/// Number of executed control steps per second of idle time before an episode may be suspended. This idle
+/// time is ten times as long as resuming the episode takes.
 const STEPS_PER_IDLE_S: u32 = 300;
 
 impl EpisodeTable {
-    /// Starts to keep journals in `journals`, and holds the episodes of a server that has ended.
+    /// Begins to write journals to `journals`, and takes over the episodes of a server that has ended.
     pub fn keep_journals(&self, journals: LiveFolder) {
         let ids = journals.ids();
         if self.journals.set(journals).is_err() {
@@ -57,8 +58,7 @@ impl EpisodeTable {
     ///
     /// # Errors
     ///
-    /// Returns an error if the episode is unknown, if another server plays it, or if it cannot be brought
-    /// back.
+    /// Returns an error if the episode is unknown, if another server plays it, or if it cannot be restored.
     pub async fn awake(self: &Arc<Self>, id: &str) -> Result<HostedEpisode, HostingError> {
         let hosted = match self.hosted(id) {
             Ok(hosted) => hosted,
@@ -76,7 +76,7 @@ impl EpisodeTable {
         there.map(|()| hosted)
     }
 
-    /// Does the same as [`EpisodeTable::operator`], for all servers on the runs folder.
+    /// Does the same as [`EpisodeTable::operator`], for the episodes of all servers on the runs folder.
     pub async fn operator_anywhere(self: &Arc<Self>, text: &str) -> Option<Caller> {
         if let Some(found) = self.operator(text) {
             return Some(found);
@@ -86,8 +86,8 @@ impl EpisodeTable {
         spawn_blocking(move || table.operator_elsewhere(&text)).await.ok()?
     }
 
-    /// Finds the operator with this token among the episodes that are not held here. Each journal's
-    /// heading is read once, however many tokens are tried. Every token is compared.
+    /// Finds the operator with the token `text` among the episodes that this server does not hold. The
+    /// heading of a journal is read only once, not for every token tried. All tokens are compared.
     fn operator_elsewhere(&self, text: &str) -> Option<Caller> {
         let journals = self.journals.get()?;
         let ids = journals.ids();
@@ -107,7 +107,7 @@ impl EpisodeTable {
         })
     }
 
-    /// Holds the episode `id`, which has a journal, unless another server plays it.
+    /// Adds the episode `id`, which has a journal, to the table unless another server plays it.
     fn adopt(&self, id: &str) -> Result<HostedEpisode, HostingError> {
         let journals = self.journals.get().ok_or_else(|| unknown(id))?;
         let path = journals.journal(id).filter(|path| path.exists()).ok_or_else(|| unknown(id))?;
@@ -143,13 +143,13 @@ impl EpisodeTable {
             self.starts.keep(key, (args, heading.driving), Ok(heading.start));
         }
         match self.hold(hosted.clone()) {
-            // Another caller was quicker.
+            // Another caller has added the episode meanwhile.
             Err(HostingError::HeldAlready { .. }) => self.hosted(id),
             held => held.map(|()| hosted),
         }
     }
 
-    /// Ends abandoned episodes and suspends idle ones. Also reconnects the partners that drove on the
+    /// Ends abandoned episodes and suspends idle episodes. Also reconnects the partners that drove on the
     /// previous server. Call it periodically from within the async runtime.
     pub fn tidy_up(&self) {
         let episodes = self.all();
@@ -173,7 +173,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Forgets the suspended episodes that other servers have taken over or ended. Call it every few seconds.
+    /// Removes from the table the suspended episodes that other servers have taken over or ended. Call it
+    /// every few seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {
@@ -193,10 +194,10 @@ fn team_of(journals: &LiveFolder, id: &str) -> Option<Team> {
     Team::of(&heading.start.operators, &heading.driving, TeamRules::default()).ok()
 }
 
-/// Turns a recording that was left unfinished into a readable one.
+/// Makes an unfinished recording readable.
 fn make_whole(journal: &Path, folder: &RunFolder, url: &str) {
     let partial = partial_path(&folder.path.join(Recorder::FILE_NAME));
-    // The lease keeps other servers from doing the same.
+    // The lease prevents other servers from doing the same at this time.
     let Ok(Leasing::Taken(_lease)) = Lease::take(journal, url) else { return };
     if fs::exists(&partial).unwrap_or(false)
         && let Err(error) = recover(&partial)

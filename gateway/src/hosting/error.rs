@@ -1,4 +1,4 @@
-//! Refusals of the host of episodes.
+//! Errors with which the host of episodes refuses requests.
 
 use std::{io, path::PathBuf, sync::Arc};
 
@@ -7,23 +7,23 @@ use tandem_tools_spec::{Refusal, RefusalClass};
 
 use crate::token::TokenError;
 
-/// Refusals of the host, and refusals of the episode that it passes on.
+/// Refusal by the host, or refusal by an episode that the host passes on.
 #[derive(Debug, thiserror::Error)]
 pub enum HostingError {
     /// The episode refused the call.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// The episode does not exist. Existing ones are not listed, because only their callers may know
-    /// them.
+    /// The episode does not exist. The error does not list existing episodes, because their ids are known
+    /// only to their callers.
     #[error("no episode {id:?}")]
     UnknownEpisode {
         /// Requested id.
         id: String,
     },
-    /// All places for episodes are taken.
+    /// The episode limit is reached.
     #[error("all {limit} places for episodes are taken")]
     TooManyEpisodes {
-        /// Number of places.
+        /// Maximum number of episodes.
         limit: u32,
     },
     /// Too many calls are waiting for one episode.
@@ -38,16 +38,16 @@ pub enum HostingError {
     /// Another episode has this id.
     #[error("an episode {id:?} is held already")]
     HeldAlready {
-        /// Id of both.
+        /// Id of both episodes.
         id: String,
     },
-    /// The image of a link is not kept, or is of another operator's robot.
+    /// The linked image is no longer kept, or another operator's robot took it.
     #[error(
         "no image {name:?} of yours is kept, only the latest {kept} that replies of this episode linked to; \
          observe again"
     )]
     NoImage {
-        /// Name in the link.
+        /// Name of the image in the link.
         name: String,
         /// Number of images that are kept.
         kept: usize,
@@ -57,7 +57,7 @@ pub enum HostingError {
     HeldElsewhere {
         /// Requested id.
         id: String,
-        /// URL of the server that plays it.
+        /// URL of the server that plays the episode.
         url: String,
     },
     /// The episode was begun by another build; only that build restores the same state.
@@ -74,12 +74,12 @@ pub enum HostingError {
         /// Folder of the recording.
         folder: PathBuf,
     },
-    /// The journal from which the episode is to be brought back cannot be read or written.
+    /// The journal of the episode cannot be read or written.
     #[error("the journal {}: {source}", .path.display())]
     Journal {
         /// Path of the journal.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The episode was closed meanwhile.
@@ -101,7 +101,7 @@ pub enum HostingError {
         /// Robots whose operators have not commanded yet.
         waits_for: Vec<String>,
     },
-    /// The operator's command timed out, and it has not been notified yet.
+    /// The operator gave no command within the time limit, and has not been notified of the hold yet.
     #[error(
         "robot {robot:?} was held still from step {from_step} to {to_step}, because the others' patience ran \
          out before a command came; look again, then command"
@@ -140,39 +140,39 @@ pub enum HostingError {
          episode returned, as Authorization: Bearer TOKEN"
     )]
     NeedsOperator,
-    /// An operator's request concerns more than its robot.
+    /// An operator's request concerns more than the operator's robot.
     #[error(
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
-    /// One policy controls all robots, so no other driver can take a robot.
+    /// One policy controls all robots of the episode, so no other driver can take over a robot.
     #[error(
         "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for \
          somebody else to drive one of them"
     )]
     OnePolicy,
-    /// A client tried to start an episode, but an evaluation in this process holds the only one.
+    /// A client tried to start an episode, but this server only holds the episode of an evaluation.
     #[error(
         "this server holds the one episode that an evaluation scores, and starts no other; play the one that \
          your brief and the environment's TANDEM_EPISODE name"
     )]
     OneEpisode,
-    /// A program of this process was to replace a person in a collection.
+    /// An expert or a policy was requested to replace a person in a collection.
     #[error(
         "in a collection people drive, and nobody else in their place; demonstrations of the expert are \
          tandem collect's without --operators"
     )]
     PeopleDrive,
-    /// No expert here can drive a robot of this task.
+    /// No expert of this process can drive a robot of this task.
     #[error("{0}")]
     NoExpert(#[source] PlayerError),
-    /// No policy can drive a robot here.
+    /// No policy can drive a robot on this server.
     #[error("{reason}")]
     NoPolicy {
-        /// Missing part.
+        /// Reason why no policy can drive.
         reason: String,
     },
-    /// Talking is not enabled here.
+    /// Messages between operators are not enabled in this episode.
     #[error(
         "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and \
          talk true"
@@ -189,25 +189,25 @@ pub enum HostingError {
         /// Number of unread messages.
         unheard: usize,
     },
-    /// The idempotency key belongs to a different request.
+    /// The idempotency key was used for a different request before.
     #[error(
         "this Idempotency-Key came with another request before; a key stands for one request, so take a new \
          one for each"
     )]
     KeyUsed,
-    /// No token could be made for an operator.
+    /// No token could be generated for an operator.
     #[error(transparent)]
     Token(#[from] TokenError),
     /// A refusal that several callers share.
     #[error(transparent)]
     Shared(Arc<HostingError>),
-    /// The system could not start a thread for the world.
+    /// The operating system could not start a thread for the episode.
     #[error("no thread for an episode: {0}")]
     Thread(#[source] io::Error),
 }
 
 impl HostingError {
-    /// Returns the refusal that the caller receives.
+    /// Returns the refusal to send to the caller.
     pub fn refusal(&self) -> Refusal {
         use RefusalClass::{
             Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,
@@ -269,8 +269,7 @@ impl HostingError {
         }
     }
 
-    /// Returns true if the turns of the operators blocked the call, so that it has not reached the
-    /// episode.
+    /// Returns true if the rules for operators blocked the call, so that it has not reached the episode.
     pub fn is_of_the_team(&self) -> bool {
         match self {
             HostingError::DoubleCommand { .. }
@@ -306,7 +305,7 @@ impl HostingError {
         }
     }
 
-    /// Returns true if another server has the episode, or if it no longer exists.
+    /// Returns true if another server plays the episode, or if the episode does not exist.
     pub fn is_elsewhere(&self) -> bool {
         match self {
             HostingError::HeldElsewhere { .. } | HostingError::UnknownEpisode { .. } => true,
@@ -324,7 +323,7 @@ impl HostingError {
         }
     }
 
-    /// Returns the URL of the other server that plays the episode, if one does.
+    /// Returns the URL of the other server that plays the episode; `None` for other errors.
     pub fn elsewhere(&self) -> Option<&str> {
         match self {
             HostingError::HeldElsewhere { url, .. } => Some(url),

@@ -1,5 +1,5 @@
-//! An episode as callers see it: driven by one policy or by an operator per robot, with an idempotency
-//! cache of replies.
+//! Episodes with the state that callers share: the operators, if each robot has one, and the cached replies
+//! and images.
 
 use std::sync::Arc;
 
@@ -19,10 +19,11 @@ use super::{
     team::{OperatorHandle, Team},
 };
 
-/// The caller, identified by its token.
+/// Caller, identified by its token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Caller {
-    /// The host's client. It may start episodes and drives those that one policy controls.
+    /// The host's client. It may start episodes, and it drives episodes in which one policy controls all
+    /// robots.
     Host,
     /// The operator of one robot.
     Operator {
@@ -47,17 +48,17 @@ impl Caller {
 #[derive(Debug, Clone)]
 pub struct HostedEpisode {
     id: String,
-    /// The thread that owns its world.
+    /// Thread that owns the world of the episode.
     pub thread: Arc<EpisodeThread>,
     beside: Arc<Beside>,
 }
 
-/// State that a server keeps of an episode besides its world.
+/// State that a server keeps for an episode besides its world.
 #[derive(Debug, Default)]
 pub struct Beside {
     /// Operators of the robots; `None` if one policy controls all robots.
     team: Option<Arc<Team>>,
-    /// Replies that may be requested again.
+    /// Replies by idempotency key, for repeated requests.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
     notes: IdempotencyCache<Note, SharedNote>,
     /// Images to which replies link.
@@ -104,7 +105,7 @@ impl HostMemory for Beside {
     }
 
     fn let_go(&self) {
-        // Remaining entries would keep their memory in use.
+        // Clears the caches, because their entries would stay in memory.
         self.replies.clear();
         self.notes.clear();
         self.images.clear();
@@ -121,7 +122,7 @@ impl HostedEpisode {
         HostedEpisode { id: id.into(), thread, beside }
     }
 
-    /// Returns the operators; `None` if one policy controls all robots.
+    /// Returns the robots' operators; `None` if one policy controls all robots.
     pub fn team(&self) -> Option<&Arc<Team>> {
         self.beside.team.as_ref()
     }
@@ -136,7 +137,7 @@ impl HostedEpisode {
         &self.id
     }
 
-    /// Answers a call. With a key, the call runs once for this key and caller.
+    /// Answers a call. A call with an idempotency key runs once for this key and caller.
     pub async fn call(
         &self,
         who: &Caller,
@@ -151,7 +152,7 @@ impl HostedEpisode {
         let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
         let keyed = Keyed { key: key.clone(), request: call.clone() };
-        // Boxed, because it takes kilobytes and is moved several times.
+        // The future is boxed, because it takes kilobytes and is moved several times.
         let work = Box::pin(async move {
             episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new)
         });
@@ -160,8 +161,8 @@ impl HostedEpisode {
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Records a note of the host's client or of an operator. With a key, it is recorded once for this
-    /// key and caller.
+    /// Records a note of the host's client or of an operator. A note with an idempotency key is recorded once
+    /// for this key and caller.
     pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
         let Some(key) = key.map(|key| own_key(who.robot(), key)) else {
             return self.keep_note(who, note, None).await;
@@ -185,7 +186,7 @@ impl HostedEpisode {
         self.thread.refused(who.robot(), call).await;
     }
 
-    /// Returns the state of the episode for a watcher; it does not count as a call.
+    /// Returns the state of the episode for a watcher. The request does not count as a call.
     pub async fn status(&self, who: &Caller) -> Result<Answer, HostingError> {
         let mut answer = self.thread.status().await?;
         if let Caller::Operator { .. } = who
@@ -221,12 +222,12 @@ impl HostedEpisode {
             .ok_or_else(|| HostingError::NoImage { name: name.into(), kept: MAX_LINKED_IMAGES })
     }
 
-    /// Returns its entry in the list of episodes, without information that is hidden from policies.
+    /// Returns the entry in the list of episodes, without information that is hidden from policies.
     pub fn told_entry(&self) -> EpisodeEntry {
         EpisodeEntry { seed: self.thread.spec().told_seed(), ..self.entry() }
     }
 
-    /// Returns the complete entry. Does not wait for the thread, which may be busy.
+    /// Returns the complete entry in the list of episodes, without waiting for the thread, which may be busy.
     pub fn entry(&self) -> EpisodeEntry {
         let spec = self.thread.spec();
         EpisodeEntry {
@@ -240,12 +241,12 @@ impl HostedEpisode {
         }
     }
 
-    /// Returns true if operators may talk.
+    /// Returns true if operators may send messages to each other.
     pub fn may_talk(&self) -> bool {
         self.team().is_some_and(|team| team.may_talk())
     }
 
-    /// Refuses a tool that is not available to `who`, with any arguments.
+    /// Returns an error if `tool` is not available to `who`, whatever the arguments.
     pub fn check_offered(&self, who: &Caller, tool: &str) -> Result<(), HostingError> {
         let is_operator = matches!(who, Caller::Operator { .. });
         let for_talk = |tool: &str| TalkCall::TOOLS.contains(&tool);
@@ -260,13 +261,13 @@ impl HostedEpisode {
         Err(EpisodeError::from(SpecError::UnknownTool { name: tool.into(), have }).into())
     }
 
-    /// Ends the episode as [`EpisodeThread::close`] does, and notifies operators that wait for each
-    /// other.
+    /// Closes the episode as [`EpisodeThread::close`] does, and ends the calls of operators that wait for
+    /// each other.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
         self.close_for(false).await
     }
 
-    /// Closes the episode. If `keep` is set, the episode goes on when it is brought back.
+    /// Closes the episode. If `keep` is true, the episode can be resumed later.
     pub async fn close_for(&self, keep: bool) -> Result<ResultReply, HostingError> {
         let result = if keep { self.thread.leave().await } else { self.thread.close().await };
         if let Some(team) = self.team() {
@@ -275,7 +276,7 @@ impl HostedEpisode {
         result
     }
 
-    /// Refuses a caller that may not know of this episode.
+    /// Returns an error for a caller that has no access to this episode.
     pub fn admit(&self, who: &Caller) -> Result<(), HostingError> {
         match who {
             Caller::Operator { episode, .. } if *episode != self.id => {
@@ -295,7 +296,7 @@ impl HostedEpisode {
         }
     }
 
-    /// Answers a call. Links replace the images if the call asks for links.
+    /// Answers a call. Replaces images by links if the call asks for links.
     async fn answer(
         self,
         robot: Option<String>,
@@ -342,8 +343,8 @@ impl HostedEpisode {
     }
 }
 
-/// Returns the key under which an operator's request is kept. Keys of different operators are
-/// independent.
+/// Returns the cache key of a request: the idempotency key, prefixed with the operator's robot. Keys of
+/// different operators are therefore independent.
 fn own_key(robot: Option<&str>, key: &str) -> String {
     format!("{}:{key}", robot.unwrap_or_default())
 }

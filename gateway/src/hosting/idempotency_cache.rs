@@ -1,5 +1,5 @@
-//! The idempotency cache: replies by key, so that a caller that missed a reply can repeat its request
-//! without repeating the action.
+//! A cache of replies by idempotency key. A caller that missed a reply can repeat its request without
+//! repeating the action.
 
 use std::{
     collections::VecDeque,
@@ -10,10 +10,10 @@ use tokio::sync::watch;
 
 use super::HostingError;
 
-/// Number of replies that are kept; a reply with images may take a megabyte.
+/// Maximum number of cached replies. A reply with images may take a megabyte.
 const CAPACITY: usize = 16;
 
-/// Replies `R` to requests `Q`, by the key that came with each.
+/// Replies `R` to requests `Q`, by the idempotency key of the request.
 #[derive(Debug)]
 pub struct IdempotencyCache<Q, R> {
     entries: Mutex<VecDeque<Entry<Q, R>>>,
@@ -26,12 +26,12 @@ struct Entry<Q, R> {
     reply: watch::Receiver<Option<R>>,
 }
 
-/// A reply, and whether an earlier request produced it.
+/// A reply, with a flag for a reply that an earlier request produced.
 #[derive(Debug, PartialEq)]
 pub struct IdempotentReply<R> {
     /// The reply itself.
     pub reply: R,
-    /// True if an earlier request with the same key received it.
+    /// True if an earlier request with the same key started the work.
     pub replayed: bool,
 }
 
@@ -42,8 +42,8 @@ impl<Q, R> Default for IdempotencyCache<Q, R> {
 }
 
 impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q, R> {
-    /// Runs `work` once per key to make the reply to `request`. Later requests with the key get the same
-    /// reply or wait for it.
+    /// Runs `work` once per key to produce the reply to `request`. Later requests with the same key get that
+    /// reply, and wait for it if necessary.
     ///
     /// A reply that is not `lasting` is forgotten, so that a repeated request tries again. The work
     /// continues if its caller leaves.
@@ -60,7 +60,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
     ) -> Result<IdempotentReply<R>, HostingError> {
         let (mut reply, replayed) = self.find_or_begin(key, request, work)?;
         let made = reply.wait_for(Option::is_some).await.map(|made| made.clone());
-        // Work that panicked made no reply. It is reported as an episode that stopped.
+        // Work that panicked produced no reply. The panic is reported as an episode that has stopped.
         let Ok(Some(made)) = made else {
             self.forget(key);
             return Err(HostingError::EpisodeStopped);
@@ -71,7 +71,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         Ok(IdempotentReply { reply: made, replayed })
     }
 
-    /// Returns a receiver of the reply, and true if the work on it had begun before.
+    /// Returns a receiver of the reply, and true if an earlier request has started the work.
     fn find_or_begin(
         &self,
         key: &str,
@@ -96,7 +96,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         Ok((reply, false))
     }
 
-    /// Keeps a reply that was made elsewhere.
+    /// Stores a reply that was produced elsewhere.
     pub fn keep(&self, key: String, request: Q, reply: R) {
         let (_, reply) = watch::channel(Some(reply));
         let mut entries = self.lock();
@@ -107,7 +107,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         }
     }
 
-    /// Forgets every finished reply.
+    /// Removes all replies whose work is complete.
     pub fn clear(&self) {
         let mut entries = self.lock();
         entries.retain(|entry| entry.reply.borrow().is_none());

@@ -1,4 +1,4 @@
-//! Images that clients fetch by links: the latest ones of an episode, in memory.
+//! Images that clients fetch by link. The latest images of an episode are kept in memory.
 
 use std::{
     collections::VecDeque,
@@ -7,7 +7,7 @@ use std::{
 
 use tandem_tools_spec::{CameraImage, ImageLink, Observation};
 
-/// Number of images that an episode keeps.
+/// Maximum number of images kept for an episode.
 pub const MAX_LINKED_IMAGES: usize = 24;
 
 /// The linked images of an episode, the latest last.
@@ -25,13 +25,14 @@ pub struct LinkedImage {
 }
 
 impl ImageLinks {
-    /// Keeps the images of an observation of `episode` after `step` control steps, and replaces them by links.
+    /// Keeps the images of the observation `seen` of `episode` after `step` control steps, and replaces them
+    /// by links.
     pub fn link(&self, episode: &str, step: u32, seen: &mut Observation) {
         let mut kept = self.lock();
         for CameraImage { robot, png_base64 } in std::mem::take(&mut seen.images) {
             let name = format!("{step}-{robot}.png");
             let path = format!("/v1/episodes/{episode}/images/{name}");
-            // A second observation of the same step gives the same image.
+            // A second observation of the same step contains the same image.
             kept.retain(|image| image.name != name);
             kept.push_back(LinkedImage { robot: robot.clone(), png: png_base64.0.into(), name });
             seen.links.push(ImageLink { robot, path });

@@ -1,5 +1,5 @@
-//! The episodes that a server holds: their table, their threads and their recording folders. Independent
-//! of the protocol by which callers reach it.
+//! The episodes that a server holds: their table, their threads and their recording folders. The module does
+//! not depend on the protocol by which callers reach it.
 
 #[cfg(test)]
 mod absurd_robot;

@@ -14,12 +14,12 @@ use tandem_episodes::{EpisodeSpec, create_new_private_folder, create_private_fol
 
 use crate::token::{Token, TokenError};
 
-/// Checks that the runs folder is writable. Creates it if necessary, and writes and removes a probe file;
-/// the folder stays.
+/// Checks that the runs folder is writable by writing and removing a probe file. Creates the folder if
+/// necessary and keeps it.
 ///
 /// # Errors
 ///
-/// The message says how to make the folder usable.
+/// Returns a message that says how to make the folder usable.
 pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
     let probe = runs.join(format!(".probe-{}", std::process::id()));
     let tried = create_private_folder(runs).and_then(|()| fs::write(&probe, "probe"));
@@ -30,12 +30,12 @@ pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
     })
 }
 
-/// Checks like [`try_runs_folder`], but removes the folders that it has created.
+/// Does the same as [`try_runs_folder`], but removes the folders that it has created.
 pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     let named = runs.ancestors().filter(|path| !path.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|path| !path.exists()).collect();
     let tried = try_runs_folder(runs);
-    // Folders created for the check are removed again, unless they are no longer empty.
+    // Folders created for the check are removed unless they are no longer empty.
     let _ = missing.into_iter().try_for_each(fs::remove_dir);
     tried
 }
@@ -55,10 +55,10 @@ const RANDOM_NAME_CHARS: usize = 10;
 /// Names and creates the folders of one server.
 #[derive(Debug, Default)]
 pub struct RunFolders {
-    /// Names of episodes that got a folder. The folder may have been removed, for example if no file could be
-    /// written there.
+    /// Names of episodes for which a folder was created. The folder may have been removed since, for example
+    /// if no file could be written to it.
     given: Mutex<BTreeSet<String>>,
-    /// Number of episodes that got no folder.
+    /// Number of episodes for which no folder could be created.
     without: AtomicU32,
 }
 

@@ -1,4 +1,4 @@
-//! The episodes that are held, by id, and the limit on their number.
+//! The table of a server's episodes by id, with the limit on their number.
 
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -39,31 +39,30 @@ pub struct EpisodeTable {
     pub(super) metrics: Arc<Metrics>,
     folders: RunFolders,
     purpose: Purpose,
-    /// Folder of the journals, if episodes outlive the server.
+    /// Folder of the journals, set if episodes outlive the server.
     pub(super) journals: OnceLock<LiveFolder>,
-    /// Operators of the episodes that other servers play, by episode id.
+    /// Operators of episodes that this server does not hold, by episode id.
     pub(super) others: Mutex<BTreeMap<String, Team>>,
     partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// Purpose of a server, and the policy that can drive beside people.
+/// Purpose of a server, and the policy that can drive a robot beside people.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Purpose of the server, which determines the clients that start episodes and the drivers of their
-    /// robots.
+    /// Purpose of the server.
     pub purpose: Purpose,
-    /// Policy that drives a robot on request of a person; pages cannot name another one.
+    /// Policy that drives a robot at a person's request; pages cannot choose another policy.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// The purpose of a server. It determines the clients that start episodes and the drivers of their robots.
+/// Purpose of a server. It determines who may start episodes and who may drive the robots.
 #[derive(Debug, Clone, Default)]
 pub enum Purpose {
     /// Clients start episodes and choose the drivers.
     #[default]
     Clients,
-    /// An evaluation in this process has episodes scored. Clients play them, but cannot start any or let
-    /// others drive.
+    /// An evaluation in this process starts episodes and scores them. Clients play these episodes, but cannot
+    /// start episodes or request other drivers.
     Evaluation,
     /// People play the episodes that a collection in this process starts.
     Collection(Arc<Collection>),
@@ -80,7 +79,7 @@ struct HeldEpisodes {
 }
 
 impl EpisodeTable {
-    /// Creates an empty table with the places, instructions and robots of `settings`.
+    /// Creates an empty table with the episode limit and the other settings in `settings`.
     pub fn new(settings: Arc<Settings>) -> EpisodeTable {
         EpisodeTable {
             held: Mutex::default(),
@@ -96,13 +95,13 @@ impl EpisodeTable {
         }
     }
 
-    /// Does the same as [`EpisodeTable::new`], for `guests`.
+    /// Creates an empty table for the purpose and the policy in `guests`.
     pub fn for_guests(settings: Arc<Settings>, guests: Guests) -> EpisodeTable {
         let Guests { purpose, partner } = guests;
         EpisodeTable { purpose, partner, ..EpisodeTable::new(settings) }
     }
 
-    /// Returns the policy that can drive beside people.
+    /// Returns the policy that can drive a robot beside people.
     ///
     /// # Errors
     ///
@@ -112,17 +111,17 @@ impl EpisodeTable {
         self.partner.clone().ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })
     }
 
-    /// Returns true if an evaluation in this process has its episodes scored.
+    /// Returns true if the episodes belong to an evaluation in this process.
     pub fn is_evaluation(&self) -> bool {
         matches!(self.purpose, Purpose::Evaluation)
     }
 
-    /// Returns true if clients start episodes here and may return to them.
+    /// Returns true if clients start episodes on this server and may resume them.
     pub fn serves_clients(&self) -> bool {
         matches!(self.purpose, Purpose::Clients)
     }
 
-    /// Returns the collection whose people play one episode after another here.
+    /// Returns the collection that this server is for, if any.
     pub fn collection(&self) -> Option<&Collection> {
         match &self.purpose {
             Purpose::Collection(collection) => Some(collection),
@@ -130,7 +129,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Refuses the start of an episode by a client during an evaluation.
+    /// Returns an error if this server is for an evaluation, in which clients start no episodes.
     fn check_starts(&self) -> Result<(), HostingError> {
         match self.purpose {
             Purpose::Evaluation => Err(HostingError::OneEpisode),
@@ -143,7 +142,7 @@ impl EpisodeTable {
         &self.metrics
     }
 
-    /// Does the same as [`EpisodeTable::start_driven`], once for each key.
+    /// Does the same as [`EpisodeTable::start_driven`], but only once for each idempotency key.
     pub async fn start_once(
         self: &Arc<Self>,
         args: StartEpisode,
@@ -163,7 +162,7 @@ impl EpisodeTable {
         self.start_driven(args, Driving::default()).await
     }
 
-    /// Starts an episode. If every place is taken, an ended episode makes room.
+    /// Starts an episode. If the episode limit is reached, an ended episode is removed first.
     pub async fn start_driven(
         &self,
         args: StartEpisode,
@@ -192,7 +191,7 @@ impl EpisodeTable {
         self.start_kept(spec, driving, None).await
     }
 
-    /// Starts an episode that a restarted server brings back; `key` belongs to the start.
+    /// Starts an episode that a restarted server can resume. `key` is the idempotency key of the start.
     async fn start_kept(
         &self,
         spec: EpisodeSpec,
@@ -209,7 +208,7 @@ impl EpisodeTable {
             let heading = Heading::new(build, spec, self.settings.record, driving, start.clone(), key);
             episode.begin_journal(heading).await?;
             if self.settings.advertised_url.is_some() {
-                // The server that receives the first request for it plays it.
+                // The server that receives the first request for the episode plays it.
                 episode.put_aside();
             }
         }
@@ -255,7 +254,7 @@ impl EpisodeTable {
         Ok((episode, StartReply { episode_id: id.into(), idle_limit_s, operators, briefing }))
     }
 
-    /// Returns the environment in which an episode is played here.
+    /// Returns the environment in which an episode is played on this server.
     pub(super) fn surroundings(
         &self,
         folder: RunFolder,
@@ -276,7 +275,7 @@ impl EpisodeTable {
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
         }
         match self.settings.assistance {
-            // The counting of the score is not part of the task.
+            // In the paper, the scored phases are not part of a task's description.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
             Assistance::Full => {}
         }
@@ -293,7 +292,7 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
-    /// Returns the operator that calls. Brings its episode back if necessary.
+    /// Returns the handle of the operator `caller`. Restores its episode if necessary.
     pub async fn own_robot(self: &Arc<Self>, caller: &Caller) -> Result<OperatorHandle, HostingError> {
         let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
         let hosted = self.awake(episode).await?;
@@ -301,8 +300,8 @@ impl EpisodeTable {
         hosted.operator(robot)
     }
 
-    /// Checks that `who` may replace operators by the expert or a policy of this process. Only the client
-    /// that starts episodes may.
+    /// Checks that `who` may replace operators by the expert or a policy of this process. Only the host's
+    /// client may do so.
     pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
         match (&self.purpose, who) {
             (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
@@ -312,7 +311,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Returns the episode `id`, whose robots have operators. Brings the episode back if necessary.
+    /// Returns the episode `id`, whose robots have operators. Restores the episode if necessary.
     pub async fn with_operators(self: &Arc<Self>, id: &str) -> Result<HostedEpisode, HostingError> {
         let hosted = self.awake(id).await?;
         hosted.team().ok_or(HostingError::OnePolicy)?;
@@ -324,7 +323,7 @@ impl EpisodeTable {
         self.hosted(id)?.briefing(who).await
     }
 
-    /// Lists the episodes that `who` may know of, by id.
+    /// Lists the episodes to which `who` has access, by id.
     pub fn list(&self, who: &Caller) -> EpisodeList {
         let held = self.lock();
         let known = held.episodes.values().filter(|episode| episode.admit(who).is_ok());
@@ -336,14 +335,14 @@ impl EpisodeTable {
         EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
-    /// Lists the suspended episodes, by id. Rendering an image would wake them.
+    /// Lists the ids of the suspended episodes. Rendering an image would resume them.
     pub fn asleep(&self) -> Vec<String> {
         let held = self.lock();
         let asleep = held.episodes.values().filter(|episode| episode.thread.sleeps());
         asleep.map(|episode| episode.id().to_owned()).collect()
     }
 
-    /// Returns true if `who` is an operator that may talk to others.
+    /// Returns true if `who` is an operator that may send messages to other operators.
     pub fn may_talk(&self, who: &Caller) -> bool {
         match who {
             Caller::Operator { episode, .. } => self.hosted(episode).is_ok_and(|hosted| hosted.may_talk()),
@@ -351,9 +350,9 @@ impl EpisodeTable {
         }
     }
 
-    /// Returns the operator with the token `text`. Every token of every episode is compared.
+    /// Returns the operator with the token `text`. Compares every token of every episode.
     ///
-    /// Between two episodes, the people of a collection are operators of an episode with an empty id.
+    /// Between two episodes, the people of a collection count as operators of an episode with an empty id.
     pub fn operator(&self, text: &str) -> Option<Caller> {
         let seat = self.collection().and_then(|collection| collection.robot_of(text));
         let seat = seat.map(|robot| Caller::Operator { episode: String::new(), robot: robot.into() });
@@ -364,11 +363,11 @@ impl EpisodeTable {
         })
     }
 
-    /// Ends the episode `id`, forgets it and returns its result.
+    /// Ends the episode `id`, removes it from the table and returns its result.
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
         let result = match episode.close().await {
-            // This build cannot play it to its end, so only its recording remains.
+            // This build cannot resume the episode, so only its recording remains.
             Err(error) if error.is_of_other_build() => {
                 let journal = self.journals.get().and_then(|journals| journals.journal(id));
                 if let Some(Err(error)) = journal.map(fs::remove_file) {
@@ -382,7 +381,7 @@ impl EpisodeTable {
         Ok(result.disclosed(self.settings.disclosure))
     }
 
-    /// Forgets the episode `id`, which another server has taken over.
+    /// Removes the episode `id`, which another server has taken over, from the table.
     pub(super) fn forget(&self, id: &str) {
         self.lock().episodes.remove(id);
     }
@@ -407,11 +406,10 @@ impl EpisodeTable {
         self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
-    /// Takes no more episodes, ends those that are held after the calls already waiting, and closes every
-    /// file.
+    /// Accepts no more episodes, ends all episodes after the calls already waiting, and closes every file.
     ///
-    /// Returns when all are closed or after `limit`, with the names of those that were not closed by then.
-    /// With `keep`, episodes go on when they are brought back; suspended episodes always do.
+    /// Returns when all episodes are closed or after `limit`, with the names of the episodes that were not
+    /// closed by then. If `keep` is true, episodes can be resumed later; suspended episodes always can.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {
@@ -431,7 +429,7 @@ impl EpisodeTable {
             });
         }
         let mut left: Vec<String> = closings.join_all().await.into_iter().flatten().collect();
-        // Also waits for episodes that are starting, including those whose client has left.
+        // Waits for episodes that are starting, too, including those whose client has disconnected.
         let places = self.settings.max_episodes;
         if timeout_at(deadline, self.places.acquire_many(places)).await.is_err() {
             let starting = (places as usize).saturating_sub(self.places.available_permits() + left.len());
@@ -440,13 +438,13 @@ impl EpisodeTable {
         left
     }
 
-    /// Holds an episode that one policy controls.
+    /// Adds an episode that one policy controls.
     #[cfg(test)]
     pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), HostingError> {
         self.hold(HostedEpisode::new(id, episode, Arc::default()))
     }
 
-    /// Holds an episode, unless the table is closing or holds one with that id, which stays.
+    /// Adds an episode. Returns an error if the table is closing or already holds an episode with that id.
     pub(super) fn hold(&self, episode: HostedEpisode) -> Result<(), HostingError> {
         let mut held = self.lock();
         if held.closing {
@@ -467,7 +465,7 @@ impl EpisodeTable {
             return Ok(place);
         }
         if let Some(ended) = self.remove_one_that_has_ended() {
-            // Its result is not for this caller.
+            // The result of the ended episode is not for this caller.
             let _ = ended.end_for_good().await;
         }
         let limit = self.settings.max_episodes;
@@ -482,7 +480,7 @@ impl EpisodeTable {
     }
 
     fn lock(&self) -> MutexGuard<'_, HeldEpisodes> {
-        // Nothing panics while it holds the lock. Even then, the map itself would be whole.
+        // Nothing panics while it holds the lock. Even after a panic, the map would be intact.
         self.held.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }

@@ -1,5 +1,5 @@
-//! Tests of episodes that fail: each ends alone and leaves a readable recording. The tests set the
-//! clocks.
+//! Tests of episodes that fail: a failure ends only its episode, and the recording stays readable. The tests
+//! control the clocks.
 
 use std::{
     path::Path,
@@ -20,7 +20,7 @@ use crate::settings::{Durability, Layer, Settings};
 
 const IDLE: Duration = Duration::from_secs(900);
 
-/// Returns the surroundings of an episode that is recorded in `folder` and has no other state.
+/// Returns the surroundings of an episode that is recorded in `folder` and has neither a team nor a journal.
 pub fn alone(folder: &Path, place: OwnedSemaphorePermit) -> Surroundings {
     let memory = Arc::new(Beside::default());
     Surroundings { folder: folder.into(), place, metrics: Arc::default(), memory, journals: None }
@@ -62,7 +62,7 @@ async fn many_who_begin_to_look_on_take_no_place_of_calls() {
         let episode = episode.clone();
         looking.spawn(async move { episode.watch().await.map(drop) });
     }
-    // All of them have begun to wait before the policy calls.
+    // All three watchers wait before the policy calls.
     tokio::task::yield_now().await;
     for _ in 0..3 {
         episode.call(wait()).await.unwrap();
@@ -78,7 +78,7 @@ async fn a_panic_ends_its_own_episode_and_no_other() {
     let broken = Arc::new(AtomicBool::new(false));
     let (breaks, readings) = (broken.clone(), AtomicU64::new(0));
     let clock: Clock = Box::new(move || {
-        // It panics once, because closing the episode also reads the clock.
+        // The clock panics only once, because closing the episode also reads it.
         assert!(!breaks.swap(false, Relaxed), "the clock is broken");
         Duration::from_millis(readings.fetch_add(1, Relaxed))
     });
@@ -160,7 +160,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     late.close().await.unwrap();
 }
 
-/// Checks that a request to a suspended episode differs from others only in its duration.
+/// Checks that a suspended episode gives the same answers as one that was never suspended.
 #[tokio::test]
 async fn an_episode_that_was_put_aside_is_as_it_was() {
     let runs = tempfile::tempdir().unwrap();

@@ -25,13 +25,13 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// State of the server for its handlers.
 #[derive(Debug, Clone)]
 pub struct AppState {
-    /// The episodes that are held.
+    /// Episodes that the server holds.
     pub table: Arc<EpisodeTable>,
     /// Settings of the server.
     pub settings: Arc<Settings>,
     /// Key that watchers need.
     pub watch_key: WatchKey,
-    /// Places for watchers.
+    /// Limit on the number of watchers.
     pub watchers: Arc<Semaphore>,
     /// Reader of recordings for watchers.
     pub recordings: RecordingReader,
@@ -72,14 +72,14 @@ impl AppState {
         }
     }
 
-    /// Returns the tools that `caller` may use. Talking is only for operators that may talk.
+    /// Returns the tools that `caller` may use. The tools for talking are only for operators that may talk.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         let mut specs = match self.table.may_talk(caller) {
             true => operator_tool_specs(self.wording(caller)),
             false => tool_specs(self.wording(caller)),
         };
         if let Caller::Operator { .. } = caller {
-            // An operator's episode goes on already, and no other can be begun.
+            // An operator's episode is already running, and an operator cannot start another.
             specs.retain(|spec| spec.on_episode);
         }
         specs
@@ -104,14 +104,14 @@ pub async fn counted<T>(
     answer
 }
 
-/// Returns the tool called `name`. Only known names are counted, because callers could invent any number
-/// of others.
+/// Returns the tool called `name`. Only known names are counted, because callers could invent any number of
+/// names.
 fn known(name: &str) -> Option<&'static str> {
     every_tool().into_iter().find(|tool| *tool == name)
 }
 
-/// Returns the names of all tools: those without an episode, those of every episode, and those that only
-/// some episodes have.
+/// Returns the names of all tools: those that need no episode, those of every episode, and those of only some
+/// episodes.
 pub fn every_tool() -> Vec<&'static str> {
     [ListTasks::NAME, StartEpisode::NAME].into_iter().chain(EPISODE_TOOLS.iter().copied()).collect()
 }

@@ -57,7 +57,7 @@ pub fn check_unique_fields(body: &[u8]) -> Result<(), String> {
     read.map(drop).map_err(|error| error.to_string())
 }
 
-/// JSON without duplicate fields, because parsers differ in which of the two values they take.
+/// JSON without duplicate fields. Parsers differ in which of two duplicate values they keep.
 struct UniqueFields(Value);
 
 impl<'de> Deserialize<'de> for UniqueFields {

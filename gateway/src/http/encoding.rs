@@ -13,7 +13,7 @@ use super::{
     problem::ApiError,
 };
 
-/// Media types of MessagePack: the registered one, and an older one.
+/// Media types of MessagePack: the registered type and an older type.
 const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
 
 /// Formats of a request's body and of its reply.
@@ -57,7 +57,7 @@ impl Encoding {
         Encoding { body, reply }
     }
 
-    /// Parses a body. An empty one is an object without fields.
+    /// Parses a body. An empty body is an object without fields.
     pub fn read(self, body: &[u8]) -> Result<Value, ApiError> {
         match self.body {
             BodyFormat::Json => json_object(body),

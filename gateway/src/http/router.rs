@@ -32,7 +32,7 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
         .nest_service("/mcp", mcp::router(app.clone()))
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
-        // The gate has its own limit.
+        // The gate has its own limit on bodies.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(limits.clone(), limits::take_place))
         .layer(middleware::from_fn_with_state(gate, gate::pass))
@@ -75,8 +75,8 @@ async fn count_refusal(State(app): State<AppState>, request: Request, next: Next
 /// Logs every request, and turns axum's own refusals into problem details, for example for a path that is
 /// not UTF-8.
 ///
-/// The log contains only the route and the id of an existing episode, because any other part of the caller's
-/// text may be a secret.
+/// The log contains only the route and the id of an existing episode, because any other text from the caller
+/// may be a secret.
 async fn log_and_describe(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();

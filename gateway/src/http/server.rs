@@ -22,21 +22,21 @@ use crate::{
     settings::Settings,
 };
 
-/// Number of threads for requests. They only parse, wait and answer, because the worlds have threads of
-/// their own.
+/// Number of threads for requests. They only parse, wait and answer, because the simulations have separate
+/// threads.
 const HTTP_THREADS: usize = 2;
 
 /// Minimum number of connections of one address that may wait for a request, even if the limit on requests is
 /// lower.
 const MIN_WAITING_PER_ADDRESS: usize = 64;
 
-/// Time that requests may take to arrive at shutdown.
+/// Maximum time at shutdown to wait for requests that are still being received.
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
 /// Interval between two searches for abandoned episodes.
 const TIDY_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Number of these intervals per check of the other servers on the same runs folder.
+/// Number of these intervals between checks of the other servers on the same runs folder.
 const TICKS_PER_LOOK: u64 = 10;
 
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets pending calls finish.
@@ -57,7 +57,7 @@ impl Server {
         Server::start_for(settings, Guests::default())
     }
 
-    /// Does the same as [`Server::start`], for `guests`.
+    /// Does the same as [`Server::start`], with the purpose and the policy in `guests`.
     pub fn start_for(settings: Arc<Settings>, guests: Guests) -> io::Result<Server> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
@@ -106,12 +106,13 @@ impl Server {
         Ok(Server { runtime, address, watch_link, table, stop, served, settings })
     }
 
-    /// Returns the address on which it serves.
+    /// Returns the address of the server.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Returns the watch link. It grants full view, so it must not be logged or given to policies.
+    /// Returns the watch link. It grants a full view of all episodes, so it must not be logged or given to
+    /// policies.
     pub fn watch_link(&self) -> &str {
         &self.watch_link
     }
@@ -142,7 +143,7 @@ impl Server {
         Ok((self.table.get(id)?, start))
     }
 
-    /// Ends the episode `id` and forgets it.
+    /// Ends the episode `id` and removes it.
     pub fn remove(&self, id: &str) -> Result<(), HostingError> {
         self.runtime.block_on(self.table.remove(id)).map(drop)
     }
@@ -154,7 +155,7 @@ impl Server {
 
     /// Serves until a shutdown signal, then stops as [`Server::stop`] does.
     ///
-    /// Running episodes go on when the next server on the same runs folder brings them back, unless the
+    /// Running episodes continue when the next server on the same runs folder restores them, unless the
     /// signal came from the keyboard.
     pub fn run_until_signal(self) -> Vec<String> {
         let keep = self.runtime.block_on(shutdown_signal()) == ShutdownSignal::Terminate;
@@ -166,14 +167,14 @@ impl Server {
         self.stop_for(keep)
     }
 
-    /// Takes no more requests, finishes pending calls and closes every recording. Returns after at most
-    /// the time that the settings allow. Episodes that were not closed by then are logged and returned.
+    /// Stops accepting requests, finishes pending calls and closes every recording. Returns after at most the
+    /// time that the settings allow. Episodes that were not closed by then are logged and returned.
     pub fn stop(self) -> Vec<String> {
         self.stop_for(false)
     }
 
-    /// Does the same as [`Server::stop`], but running episodes go on when the next server on the same
-    /// runs folder brings them back.
+    /// Does the same as [`Server::stop`], but running episodes continue when the next server on the same runs
+    /// folder restores them.
     pub fn stop_keeping(self) -> Vec<String> {
         self.stop_for(true)
     }

@@ -1,4 +1,4 @@
-//! Test of an episode with diverging physics, over HTTP and at the same time as a normal one.
+//! Test of an episode with diverging physics, over HTTP and at the same time as a normal episode.
 
 use std::{path::Path, sync::Arc};
 
@@ -15,7 +15,7 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// Makes `server` hold a Handover episode with the robots of a file, which no caller can request.
+/// Adds a Handover episode to `server` that uses the robots of a file. No caller can request such an episode.
 fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
     let handover = tasks::find("handover").unwrap();
     let spec = EpisodeSpec {
@@ -81,7 +81,7 @@ fn physics_that_diverges_ends_its_own_episode_and_says_at_which_body() {
     assert!(failure.ends_with(&again.to_string()), "{failure} {again}");
     let mut sound = Session::start(kept.spec(), None).unwrap();
     sound.resume(&kept).unwrap();
-    // A checkpoint has no poses of the step before.
+    // A checkpoint has no camera poses of the previous step.
     last.robots.iter_mut().for_each(|robot| robot.truth.world_from_camera_before = None);
     assert_eq!((sound.present(), sound.ended()), (&last, None), "the last good step, to go on from");
     assert_eq!(Some(sound.state_hash()), result.state_hash);

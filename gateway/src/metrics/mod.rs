@@ -13,7 +13,7 @@ use std::{
 use page::Histogram;
 use tandem_tools_spec::EndReason;
 
-/// Counts since the server began.
+/// Counts since the start of the server.
 #[derive(Debug, Default)]
 pub struct Metrics {
     counts: Mutex<Counts>,
@@ -26,7 +26,7 @@ struct Counts {
     ended: BTreeMap<String, u64>,
     /// Number of calls by tool and HTTP status.
     calls: BTreeMap<(&'static str, u16), u64>,
-    /// Response times by tool.
+    /// Times to answer calls, by tool.
     answered: BTreeMap<&'static str, Histogram>,
     /// Number of refusals by the kind of problem.
     refused: BTreeMap<String, u64>,
@@ -70,8 +70,8 @@ impl Metrics {
         self.lock().physics
     }
 
-    /// Returns all counts in the format of Prometheus. `held` is the number of episodes at present, and
-    /// `running` the number of those that have not ended.
+    /// Returns all counts in the format of Prometheus. `held` is the number of held episodes, and `running`
+    /// is the number of those that have not ended.
     pub fn page(&self, held: usize, running: usize) -> String {
         let counts = self.lock();
         let mut page = MetricsPage::default();
@@ -98,7 +98,7 @@ impl Metrics {
     }
 
     fn lock(&self) -> MutexGuard<'_, Counts> {
-        // A thread that panics while it counts leaves every count valid.
+        // Every count stays valid even if a thread panics while it holds the lock.
         self.counts.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }

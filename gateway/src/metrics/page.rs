@@ -21,7 +21,7 @@ impl MetricsPage {
         self.line(format_args!("{name} {value}"));
     }
 
-    /// Adds a counter by label; its numbers only grow.
+    /// Adds a counter with a value for each label. A counter never decreases.
     pub fn counter<L: Display, V: Display>(
         &mut self,
         name: &str,
@@ -68,14 +68,14 @@ impl MetricsPage {
     }
 }
 
-/// Upper bounds of the buckets in seconds. Calls without physics take less than a millisecond, commands
-/// and images a few hundred.
+/// Upper bounds of the buckets in seconds. Calls without physics take less than a millisecond. Commands and
+/// images take a few hundred milliseconds.
 const BOUNDS_S: [f64; 12] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0];
 
 /// Durations, counted in buckets.
 #[derive(Debug, Default)]
 pub struct Histogram {
-    /// Number of durations per bucket; the last counts those above every bound.
+    /// Number of durations per bucket. The last bucket counts the durations above every bound.
     counts: [u64; BOUNDS_S.len() + 1],
     sum: Duration,
 }

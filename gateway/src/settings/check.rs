@@ -7,7 +7,7 @@ use tandem_episodes::stress::StressAxis;
 use super::{Layer, Record, SettingsError};
 
 impl Layer {
-    /// Refuses values with which no server could be used.
+    /// Refuses values that would make a server unusable.
     pub fn check(&self) -> Result<(), SettingsError> {
         let numbers = [
             ("thinking_limit", self.thinking_limit.map(u64::from), "3600"),

@@ -45,7 +45,7 @@ pub enum SettingsError {
         /// Example of a valid number.
         example: &'static str,
     },
-    /// A stress level is given without a stress axis.
+    /// A stress level is given without a kind of stress.
     #[error(
         "a level says how much of what goes wrong; give stress, too, for example camera, or leave level out"
     )]
@@ -53,7 +53,7 @@ pub enum SettingsError {
     /// Two settings change the wording of tasks.
     #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
     TwoWordings,
-    /// A live view of recordings that are readable only after their episodes.
+    /// A live view is requested, but recordings are readable only after their episodes.
     #[error("foxglove shows recordings during episodes, and record is \"after\"; leave one of them out")]
     LiveAfter,
     /// An allowed host is not a host name.
@@ -82,7 +82,7 @@ pub enum SettingsError {
     /// The scene, the robot, the base controller or the renderer cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// The robot has changed since it was read.
+    /// The robot has changed since it was read, or does not fit the task or the base controller.
     #[error(transparent)]
     Robot(#[from] RobotError),
     /// The file is not valid TOML, or has an unknown setting.

@@ -34,7 +34,7 @@ pub enum TlsError {
         /// Name of the missing flag.
         missing: &'static str,
     },
-    /// A file cannot be read, or is not in PEM form.
+    /// A file cannot be read, or is not in PEM format.
     #[error("cannot read {what} in {}: {source}; {MAKES_ONE}", .path.display())]
     Unreadable {
         /// Expected content.

@@ -1,5 +1,5 @@
-//! Tests of language models, which Python plays: the errors if it cannot, and its start. A script
-//! replaces Python here; the package's own tests cover the loop.
+//! Tests of language models, which Python plays: the start of Python, and the errors if it cannot play. A
+//! script replaces Python here. The package's own tests cover the loop.
 
 use std::{
     fs,
@@ -18,7 +18,8 @@ fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
     (output, printed.concat())
 }
 
-/// Creates an interpreter that runs `what` instead of the loop, or `when_checked` if it is only checked.
+/// Creates an interpreter that runs `what` instead of the loop, or `when_checked` if it gets the flag
+/// `--check`.
 #[cfg(unix)]
 fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;
@@ -114,7 +115,7 @@ fn a_run_costs_no_more_than_its_limit() {
     let (output, printed) = evaluate(priced, &["--max-usd", "1.5", "--out", out]);
     assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
     assert!(printed.contains("the run has cost 1.40 US dollars, and another episode may pass --max-usd 1.5"));
-    // Kept episodes count.
+    // Kept episodes count towards the limit.
     let (output, printed) = evaluate(priced, &["--max-usd", "2", "--out", out]);
     assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
     let (output, printed) = evaluate(priced, &["--dry-run", out]);

@@ -1,4 +1,4 @@
-//! Tests of the program's own information, and of settings that it refuses to serve with.
+//! Tests of the program's information about itself, and of settings with which it refuses to serve.
 
 use std::{
     fs,
@@ -8,7 +8,7 @@ use std::{
 
 use serde_json::Value;
 
-/// Runs `tandem` with these arguments and variables to its end.
+/// Runs `tandem` to its end with these arguments and environment variables.
 fn tandem(args: &[&str], variables: &[(&str, &str)]) -> Output {
     let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
     program.args(args).envs(variables.iter().copied()).output().expect("the program starts")

@@ -16,13 +16,13 @@ use crate::Server;
 /// Time limit for a message.
 const MESSAGE_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Kind of the binary messages with data.
+/// Opcode of the binary messages with data.
 const MESSAGE_DATA: u8 = 1;
 
 /// A connected client.
 struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// Number of each advertised topic's channel.
+    /// Channel number of each advertised topic.
     channels: BTreeMap<String, u64>,
 }
 
@@ -37,8 +37,8 @@ impl Viewer {
         Viewer { socket, channels: BTreeMap::new() }
     }
 
-    /// Returns the next data: subscription, time in nanoseconds, and bytes. Follows advertisements on the
-    /// way, and returns `None` after one.
+    /// Returns the next data message: subscription, time in nanoseconds, and bytes. Returns `None` after an
+    /// advertisement, whose channels it stores.
     fn next(&mut self) -> Option<(u32, u64, Vec<u8>)> {
         loop {
             match self.socket.read().expect("a message") {
@@ -92,8 +92,8 @@ fn recorded(bytes: &[u8], topic: &str) -> Vec<(u64, Vec<u8>)> {
     of_topic.map(|message| (message.log_time, message.data.to_vec())).collect()
 }
 
-/// A client that comes late gets the scene. It then gets every message of the recording, and the channels
-/// of the next episode once that begins.
+/// A client that connects late gets the scene. It then gets every message of the recording, and the channels
+/// of the next episode when that begins.
 #[test]
 fn foxglove_shows_the_episode_that_began_last() {
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
@@ -106,7 +106,7 @@ fn foxglove_shows_the_episode_that_began_last() {
     let mut viewer = Viewer::connect(port);
     let (scene, budget) = (viewer.channel("/scene", None), viewer.channel("/budget", None));
     viewer.subscribe([(2, budget), (1, scene)]);
-    // The scene's message says that the subscription before is in effect, too.
+    // The scene's message shows that the earlier subscription is in effect, too.
     let drawn = loop {
         if let Some((1, _, bytes)) = viewer.next() {
             break bytes;

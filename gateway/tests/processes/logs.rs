@@ -8,7 +8,7 @@ use std::{
 use serde_json::{Value, json};
 use ureq::Agent;
 
-/// A running program, killed when it is dropped.
+/// A running program. Dropping it kills the program.
 struct Running(Child);
 
 impl Drop for Running {
@@ -29,7 +29,7 @@ fn every_line_about_an_episode_names_it() {
         .expect("the program starts");
     let mut server = Running(server);
     let lines = BufReader::new(server.0.stderr.take().expect("its log")).lines().map_while(Result::ok);
-    // GPU drivers may write lines before.
+    // GPU drivers may write lines before the log.
     let lines = lines.skip_while(|line| !line.starts_with('{'));
     let mut lines = lines.map(|line| serde_json::from_str::<Value>(&line).expect("a line of JSON"));
     let serving = |line: Value| Some(line["message"].as_str()?.split_once("serving on ")?.1.to_owned());

@@ -1,4 +1,5 @@
-//! Tests of `tandem collect --operators`. The people are programs here that only finish their episodes.
+//! Tests of `tandem collect --operators`. The people are replaced by programs that only finish their
+//! episodes.
 
 use std::{
     fs,
@@ -49,7 +50,7 @@ impl Collecting {
         (answer.status().as_u16(), answer.body_mut().read_json().unwrap_or_default())
     }
 
-    /// Waits for `stage`, and returns the progress then.
+    /// Waits for `stage`, and returns the progress at that time.
     fn wait_for(&self, stage: &str) -> Value {
         loop {
             let (status, progress) = self.ask(&self.tokens[0], "/operate/collection", None);

@@ -1,4 +1,4 @@
-//! Tests of `report` and `leaderboard` on folders of real episodes: every format, links that lead to files,
+//! Tests of `report` and `leaderboard` on folders of real episodes: every format, links to existing files,
 //! and LaTeX that compiles.
 
 use std::{
@@ -22,13 +22,13 @@ fn tandem(folder: &Path, arguments: &[&str]) -> String {
     printed
 }
 
-/// Plays one episode of Handover, recorded, with a policy that does not solve it.
+/// Plays and records one episode of Handover with a policy that does not solve it.
 fn play(folder: &Path, policy: &str, out: &str) {
     let task = ["--tasks", "handover", "--seeds", "2000", "--protocol", "benchmark", "--record"];
     tandem(folder, &[&["evaluate", "--policy", policy, "--out", out], &task[..]].concat());
 }
 
-/// Returns the targets of the links in a page that are no addresses.
+/// Returns the targets of the links in a page that are not URLs.
 fn local_links(page: &str) -> Vec<&str> {
     let targets = page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next());
     targets.filter(|target| !target.contains("://")).collect()
@@ -63,7 +63,8 @@ fn a_run_is_reported_in_every_format_and_its_links_lead_to_files() {
     let hash = report["episodes"][0]["state_hash"].as_str().expect("a hash");
     assert!(read("runs/a run/report.episodes.csv").lines().nth(1).expect("a row").contains(hash));
 
-    // A report in another folder has links from there; both stay valid when all folders are moved.
+    // A report in another folder has links relative to that folder. Both stay valid when all folders are
+    // moved.
     tandem(place.path(), &["report", "runs/a run", "--out", "elsewhere.html"]);
     fs::rename(place.path().join("runs"), place.path().join("moved")).expect("a renamed folder");
     let own = read("moved/a run/report.html");

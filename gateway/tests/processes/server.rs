@@ -15,7 +15,7 @@ use ureq::Agent;
 /// Time limit for the end of a server.
 const END_TIMEOUT: Duration = Duration::from_secs(90);
 
-/// A running process, killed when it is dropped.
+/// A running process. Dropping it kills the process.
 pub struct Server {
     child: Child,
     pub url: String,
@@ -28,8 +28,8 @@ impl Server {
         Server::run(Command::new(env!("CARGO_BIN_EXE_tandem")), runs)
     }
 
-    /// Starts a server as [`Server::start`] does, with a command that runs `tandem` with the arguments
-    /// after it.
+    /// Starts a server as [`Server::start`] does. `program` is a command that runs `tandem` with the
+    /// arguments that follow.
     pub fn run(mut program: Command, runs: &Path) -> Server {
         let flags = ["serve", "--listen", "127.0.0.1:0", "--runs"];
         let mut child =
@@ -43,7 +43,7 @@ impl Server {
         Server { child, url: format!("http://{address}"), agent }
     }
 
-    /// Returns the answer to a call, or `None` if the server has gone meanwhile.
+    /// Returns the answer to a call, or `None` if the server has ended in the meantime.
     pub fn post(&self, path: &str, body: &Value) -> Option<Value> {
         let request = self.agent.post(format!("{}{path}", self.url));
         // MCP requires this header, and REST accepts it.
@@ -52,7 +52,7 @@ impl Server {
         response.body_mut().read_json().ok()
     }
 
-    /// Calls a tool and returns the answer. Panics without one.
+    /// Calls a tool and returns the answer. Panics if there is none.
     #[track_caller]
     pub fn tool(&self, id: &str, tool: &str, args: &Value) -> Value {
         self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args).expect("an answer")

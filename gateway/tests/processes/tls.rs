@@ -130,8 +130,8 @@ struct Asked {
 /// A connection of a policy's server.
 type Secured = StreamOwned<ServerConnection, TcpStream>;
 
-/// Runs an evaluation with a policy at an encrypted server, which `serve` answers. `trusts` decides if
-/// the evaluation trusts the server.
+/// Runs an evaluation with a policy on an encrypted server, whose connections `serve` answers. The evaluation
+/// trusts the server's certificate if `trusts` is true.
 fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> String) -> Asked {
     let place = tempfile::tempdir().unwrap();
     let made = rcgen::generate_simple_self_signed(["127.0.0.1".to_owned()]).unwrap();
@@ -159,7 +159,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
             }
         }
     });
-    // A proxy that accepts connections and never answers. Local servers must be reached without it.
+    // This proxy accepts connections and never answers. Local servers must be reached without it.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let proxy = format!("http://{}", silent.local_addr().unwrap());
     let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
@@ -188,7 +188,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
     Asked { authorization: told.try_recv().unwrap_or_default(), said }
 }
 
-/// Serves openpi's protocol: the metadata, then an error.
+/// Serves openpi's protocol: sends the metadata, then an error.
 #[expect(clippy::result_large_err, reason = "tungstenite's callback has this type")]
 fn serve_openpi(stream: Secured) -> String {
     let mut authorization = String::new();
@@ -204,7 +204,7 @@ fn serve_openpi(stream: Secured) -> String {
     authorization
 }
 
-/// Serves `/act` with an error.
+/// Answers a request for `/act` with an error.
 fn serve_act(stream: Secured) -> String {
     let mut reader = BufReader::new(stream);
     let (mut authorization, mut length) = (String::new(), 0);

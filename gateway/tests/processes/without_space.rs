@@ -1,4 +1,4 @@
-//! Tests of a full disk, simulated with a limit of the system on the size of files.
+//! Tests of a full disk, which the system's limit on the size of files simulates.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::Server;
 
-/// Returns a command for the program, whose files are limited to `blocks` blocks of 512 or 1024 bytes,
+/// Returns a command that runs the program with files limited to `blocks` blocks of 512 or 1024 bytes,
 /// depending on the shell.
 fn limited(blocks: u32) -> Command {
     let mut limited = Command::new("sh");
@@ -22,7 +22,7 @@ fn limited(blocks: u32) -> Command {
     limited
 }
 
-/// Starts a server with room for the beginning of an episode.
+/// Starts a server with space for only the beginning of an episode.
 fn small(runs: &Path) -> Server {
     Server::run(limited(512), runs)
 }

@@ -11,13 +11,13 @@ use crate::seeds::is_asked;
 use crate::single::{self, Subject};
 use crate::teams::{carrying, holding, placing};
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
-/// Single robots come first, then two robots with fingers that carry an object together. Calls `done` after
-/// each case.
+/// Plays the cases whose names contain one of the comma-separated words of `filter` on these seeds. Single
+/// robots come first, then two robots with fingers that carry an object together. Calls `done` after each
+/// case.
 ///
 /// # Errors
 ///
-/// If a file cannot be read, or a world cannot be built.
+/// Returns an error if a file cannot be read, or a world cannot be built.
 pub fn locomotion(
     robot: &RobotFile,
     controller: &Controller,
@@ -49,12 +49,13 @@ pub fn locomotion(
     Ok(report)
 }
 
-/// Plays the cases of single robots whose names contain one of the words of `filter`, as [`locomotion`] does,
-/// with a velocity policy that drives all motors by its own gains.
+/// Plays the cases of single robots that match `filter`, like [`locomotion`], with a velocity policy that
+/// drives all motors with its own gains.
 ///
 /// # Errors
 ///
-/// If a file cannot be read, a world cannot be built, or the controller is no policy from a file.
+/// Returns an error if a file cannot be read, a world cannot be built, or the controller is not a policy from
+/// a file.
 pub fn motors(
     robot: &RobotFile,
     controller: &Controller,

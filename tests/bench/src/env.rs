@@ -1,5 +1,5 @@
-//! Speed of environments for learners: batches of two and three standing robots, without images, compared
-//! with the core alone.
+//! Speed of learning environments: batches with two or three standing robots each, without images, compared
+//! with the simulation core alone.
 
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use crate::spread::{Spread, busy_since};
 
 const WORLDS: usize = 8;
 const ROUNDS: usize = 5;
-/// Steps in which robots come to rest; `STEPS` are the timed ones.
+/// Number of steps in which robots come to rest; `STEPS` is the number of timed steps.
 const SETTLING_STEPS: u32 = 25;
 const STEPS: u32 = 75;
 const FIRST_SEED: u32 = 2000;
@@ -30,32 +30,32 @@ pub struct EnvReport {
     pub cases: Vec<EnvCase>,
 }
 
-/// Environments of one task on `threads` threads.
+/// Results for environments of one task on `threads` threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnvCase {
     pub task: String,
     pub robots: usize,
     pub worlds: usize,
     pub threads: usize,
-    /// Steps of environments per second, of all worlds together.
+    /// Environment steps per second, over all worlds.
     pub steps_per_s: Spread,
-    /// Control steps per second of such worlds, one after another on one thread, with physics, sensing and
-    /// balance, and without any other work.
+    /// Control steps per second of the same worlds, one after another on one thread, with physics, sensing
+    /// and balance control only.
     pub core_steps_per_s: Spread,
-    /// Ratio of the first to the second, each measured right after the other.
+    /// Ratio of `steps_per_s` to `core_steps_per_s`, measured in direct succession.
     pub of_core: Spread,
-    /// Ratio of the core's processor time per step to the environment's, on one thread only. It shows the
-    /// overhead around the core on a busy machine, too.
+    /// Ratio of the core's CPU time per step to the environment's, on one thread only. It shows the overhead
+    /// around the core even on a busy machine.
     pub busy_of_core: Option<Spread>,
-    /// Time for the beginning of an episode, on one thread.
+    /// Time to start an episode on one thread.
     pub reset_ms: Spread,
 }
 
-/// Times every case; calls `done` after each.
+/// Times every case. Calls `done` after each.
 ///
 /// # Errors
 ///
-/// If a world cannot be built or stepped.
+/// Returns an error if a world cannot be built or stepped.
 pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
     let most = available_parallelism().map_or(1, usize::from).min(WORLDS);
     let mut threads = vec![1];
@@ -103,13 +103,13 @@ fn measure(task: &Task, threads: usize) -> Result<EnvCase, BenchError> {
     })
 }
 
-/// Rate of steps, and this thread's processor time for all steps.
+/// Step rate, and this thread's CPU time for all steps.
 struct Pace {
     steps_per_s: f64,
     busy_s: f64,
 }
 
-/// Stopwatch for both times.
+/// Stopwatch for wall-clock time and CPU time.
 struct Stopwatch {
     started: Instant,
     busy: Duration,
@@ -129,7 +129,8 @@ impl Stopwatch {
     }
 }
 
-/// Times the worlds of these episodes under their rest commands. They take turns as those of a batch do.
+/// Times the worlds of these episodes under their rest commands. The worlds are stepped in turn, like the
+/// worlds of a batch.
 fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     let begin = |seed: usize| -> Result<(World, Vec<RobotCommand>), BenchError> {
         let seed = FIRST_SEED + seed as u32;
@@ -152,8 +153,7 @@ fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     run(STEPS)
 }
 
-/// Times the same worlds as environments. Returns the time for the beginning of an episode, and the pace of
-/// the steps.
+/// Times the same worlds as environments. Returns the time to start an episode, and the pace of the steps.
 fn batch_pace(episode: &EpisodeSpec, threads: usize) -> Result<(f64, Pace), BenchError> {
     let world = build_world(episode).map_err(Box::new)?.world;
     let row = |robot: usize| {

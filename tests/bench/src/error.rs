@@ -7,7 +7,7 @@ use tandem_evaluation::batch::BatchError;
 use tandem_ik::IkError;
 use tandem_sim::SimError;
 
-/// Reason why the measurement cannot be made.
+/// Reason for a failed measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     #[error("cannot read the targets {path}: {source}")]

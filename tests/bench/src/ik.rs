@@ -9,16 +9,16 @@ use tandem_sim::assets;
 
 use crate::error::BenchError;
 
-/// Number of targets that are drawn if no file gives any.
+/// Number of targets drawn if no file is given.
 const SAMPLED_TARGETS: usize = 200;
 const SAMPLE_SEED: u64 = 1;
 const WRISTS: [&str; 2] = ["left_wrist_yaw_link", "right_wrist_yaw_link"];
 
-/// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.
+/// Solves the targets of a file, or 200 targets drawn from the robot's joint ranges.
 ///
 /// # Errors
 ///
-/// If the targets cannot be read, or the model cannot be used.
+/// Returns an error if the targets cannot be read, or the model cannot be used.
 pub fn ik(targets: Option<&Path>) -> Result<IkReport, BenchError> {
     let whole = Model::from_mjcf(assets::robot(assets::DEFAULT_ROBOT)?)?;
     let set = match targets {

@@ -1,5 +1,5 @@
 //! Benches: measurements of base controllers, falls, physics, images, environments and inverse kinematics,
-//! with the robots that episodes use. Nothing else imports them but the command line.
+//! with the robots that episodes use. Only the command line imports this crate.
 
 mod controllers;
 mod env;

@@ -1,5 +1,5 @@
-//! Duration of a physics step of 5 ms: robots in Handover's kitchen that stand, walk, or hold a bottle
-//! each. `tests/peers/simulation/physics_timing.py` steps the same situations in MuJoCo.
+//! Computation time of a physics step of 5 ms for robots in Handover's kitchen that stand, walk, or hold a
+//! bottle each. `tests/peers/simulation/physics_timing.py` steps the same situations in MuJoCo.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -24,12 +24,13 @@ pub struct PhysicsReport {
 pub struct PhysicsCase {
     pub name: &'static str,
     pub robots: usize,
-    /// Collision detection and dynamics of one physics step.
+    /// Time for collision detection and dynamics in one physics step.
     #[serde(rename = "step_us_median")]
     pub median_step_us: f64,
     #[serde(rename = "step_us_quartiles")]
     pub quartiles_step_us: [f64; 2],
-    /// Simulated time per wall-clock time of physics, sensing and the robots' controllers together.
+    /// Ratio of simulated time to the wall-clock time of physics, sensing and the robots' controllers
+    /// together.
     pub realtime_factor: f64,
 }
 
@@ -42,21 +43,22 @@ enum Situation {
 
 const MAX_ROBOTS: usize = 3;
 const ROUNDS: usize = 3;
-/// Number of control steps in which robots come to rest, or into their stride.
+/// Number of control steps in which robots come to rest, or reach a steady gait.
 const SETTLING_CONTROL_STEPS: usize = 75;
 const CONTROL_STEPS: usize = 150;
-/// Number of control steps in which fingers nearly close before the bottle is put between them.
+/// Number of control steps in which the fingers partly close before the bottle is placed between them.
 const CLOSING_CONTROL_STEPS: usize = 25;
 const NEARLY: f32 = 0.8;
-/// A hand closed round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
+/// Joint targets of a right hand closed round an upright cylinder of 7 cm: thumb 0 to 2, middle finger 0 and
+/// 1, index finger 0 and 1.
 const CLOSED_RAD: [f32; HAND_JOINTS] = [0.0, 0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 /// Middle of the grasped cylinder in the frame of the wrist, and the grasp height above a bottle's base.
 const GRASP_IN_WRIST_M: Vector = Vector::new(0.12, 0.055, 0.0);
 const HELD_AT_M: f32 = 0.1;
-/// Backwards, away from the counter and from each other.
+/// Forward velocity; negative, so robots walk away from the counter and from each other.
 const WALKING_M_S: f32 = -0.2;
 
-/// Measures every situation with one to three robots; `done` is called after each.
+/// Measures every situation with one to three robots. Calls `done` after each.
 ///
 /// # Errors
 ///
@@ -138,7 +140,7 @@ fn close(commands: &mut [RobotCommand], closed_share: f32) {
     }
 }
 
-/// Checks that no robot fell and no object was dropped. Otherwise the time is that of another situation.
+/// Checks that no robot fell and no object was dropped. Otherwise a different situation was timed.
 fn check(world: &World, situation: Situation) {
     let present = world.present();
     for (index, robot) in present.robots.iter().enumerate() {
@@ -155,8 +157,8 @@ fn check(world: &World, situation: Situation) {
     }
 }
 
-/// Returns Handover's places, and a third robot that stands free. Each robot has its bottle; bottles
-/// that are not held yet are out of reach.
+/// Returns the kitchen with robots at Handover's start positions; a third robot stands away from the
+/// furniture. Bottles that are not held yet are out of reach.
 fn kitchen(robots: usize, bottles: usize) -> WorldSpec {
     const PLACES: [(f32, f32, f32); MAX_ROBOTS] = [(0.0, 0.0, 0.0), (0.74, -0.12, PI), (-0.9, -1.2, 0.5)];
     let robot = |(index, (x, y, yaw_rad)): (usize, &(f32, f32, f32))| RobotPlacement {

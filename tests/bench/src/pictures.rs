@@ -1,4 +1,5 @@
-//! Duration of rendering in Handover's kitchen: both head cameras, in two sizes, and the camera in the room.
+//! Rendering time in Handover's kitchen, for both head cameras in two image sizes, and for the camera in the
+//! room.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -20,23 +21,23 @@ pub struct PicturesReport {
     pub cases: Vec<PicturesCase>,
 }
 
-/// Images of one state: colour, depth and ids, or colour alone.
+/// Times for a set of images of one state, with colour, depth and ids, or colour alone.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesCase {
     pub name: &'static str,
     pub pictures: usize,
     pub width: u32,
     pub height: u32,
-    /// CPU time of the thread that requests them; if the system does not report it, the same as `wall_ms`.
-    /// The path tracer uses other threads, too, unless only colours are requested.
+    /// CPU time of the thread that requests the images; equal to `wall_ms` if the system does not report it.
+    /// The path tracer also uses other threads, unless only colours are requested.
     pub busy_ms: Spread,
     pub wall_ms: Spread,
 }
 
-/// Common input size of learned policies.
+/// Common image size of learned policies.
 const SMALL_PX: [u32; 2] = [128, 128];
 /// Number of measured batches. CPU time is counted in ticks of some milliseconds, so a batch needs many
-/// states, unless one takes long.
+/// states, unless a single state takes long.
 const BATCHES: usize = 9;
 
 /// Returns the number of states in a batch.
@@ -47,7 +48,7 @@ fn states(kind: RendererKind) -> usize {
     }
 }
 
-/// Times all sets; `done` is called after each.
+/// Times all sets of images. Calls `done` after each.
 ///
 /// # Errors
 ///
@@ -83,10 +84,10 @@ pub fn pictures(
     Ok(PicturesReport { renderer, camera, cases })
 }
 
-/// The views of a set of images.
+/// Function that returns the camera views of a set of images.
 type Views<'a> = dyn Fn(&Step) -> Vec<CameraView> + 'a;
 
-/// Renderer of an image: of all its channels, or of its colours alone, which learned policies use.
+/// Function that renders an image with all channels, or with colour alone, as learned policies use it.
 type Draw = fn(&mut dyn Renderer, &Step, &CameraView);
 
 fn whole(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {

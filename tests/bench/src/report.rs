@@ -8,9 +8,9 @@ use tandem_sim::Sensing;
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct LocomotionReport {
-    /// Name in [`tandem_sim::assets::ROBOTS`], or of a file.
+    /// Name in [`tandem_sim::assets::ROBOTS`], or the name of a file.
     pub robot: String,
-    /// Name in recordings, with the loop if there is one.
+    /// Name of the controller in recordings, with its loop, if any.
     pub controller: String,
     #[serde(flatten)]
     pub sensing: Sensing,
@@ -27,8 +27,8 @@ pub struct CaseReport {
     pub figures: CaseFigures,
 }
 
-/// Figures of a trial or, over all seeds of a case, the worst of the robots that did not fall; velocity error
-/// and power are means. `None` if not measured in this case.
+/// Measurements of a trial or of a case. The values of a case are the worst over all robots that did not
+/// fall; velocity error and power are means. `None` if not measured in this case.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CaseFigures {
     /// Deviation of the mean velocity, as a share of the command.
@@ -38,23 +38,24 @@ pub struct CaseFigures {
     pub final_drift_m: Option<f32>,
     pub sway_m: Option<f32>,
     pub height_error_m: Option<f32>,
-    /// Time from the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
+    /// Time from the zero command until the pelvis stays slower than 0.1 m/s; `still_after_s` is for 0.02
+    /// m/s.
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
-    /// Number of times that a foot left the ground while the robot was to stand.
+    /// Number of times that a foot left the ground while the robot was commanded to stand.
     pub steps: Option<u32>,
     /// Largest tilt of the pelvis of a walking robot.
     pub pelvis_tilt_deg: Option<f32>,
     /// Maximum tilt of a load carried by several robots.
     pub load_tilt_deg: Option<f32>,
-    /// Drift of held objects after they came to rest: the mean of each second, horizontally.
+    /// Horizontal drift of held objects after they came to rest, averaged over each second.
     pub load_drift_m: Option<f32>,
     /// Mean absolute mechanical power of all joints.
     pub power_w: f32,
 }
 
 impl LocomotionReport {
-    /// Returns a line on the settings of the measurement, for below the table.
+    /// Returns a line with the settings of the measurement, to be printed below the table.
     pub fn settings(&self) -> String {
         let Sensing { state_estimate, sensors } = self.sensing;
         let (state_estimate, sensors) = (state_estimate.name(), sensors.name());
@@ -66,7 +67,7 @@ impl LocomotionReport {
 }
 
 impl CaseReport {
-    /// Column heads of [`CaseReport`]'s lines.
+    /// Header of the table whose lines [`CaseReport`] prints.
     pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  \
                             stands  still  steps  pelvis   tilt     load  power";
 }

@@ -9,8 +9,7 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
-/// Returns the result of `trial` for each of these seeds. As many run at the same time as there are
-/// processors.
+/// Returns the result of `trial` for each of these seeds. Trials run in parallel, one per processor.
 pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let seeds: Vec<u32> = seeds.clone().collect();

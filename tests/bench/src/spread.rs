@@ -1,4 +1,4 @@
-//! Measured times, with their spread.
+//! Spread of measured values, and CPU time of a thread.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ pub struct Spread {
     pub quartiles: [f64; 2],
 }
 
-/// Linux file that begins with the running time of this thread in nanoseconds.
+/// Linux file that begins with the CPU time of this thread in nanoseconds.
 const BUSY: &str = "/proc/thread-self/schedstat";
 
 /// Returns the CPU time of this thread, or the time since `started` if the system does not report it.

@@ -1,5 +1,5 @@
-//! Fuzzes recordings: they are read to the end or refused, and never use more memory than the file can
-//! hold. Checksums of 0 count as absent, so the code after them is reached, too.
+//! Fuzzes recordings. Each is read to the end or refused, and reading never uses more memory than the file
+//! can hold. Checksums of 0 count as absent, so the fuzzer also reaches the code after the checksum tests.
 #![no_main]
 
 use std::path::Path;

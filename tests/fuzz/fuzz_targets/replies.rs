@@ -1,4 +1,4 @@
-//! Fuzzes the replies to every tool, as a client may receive them: they are parsed or refused.
+//! Fuzzes the replies of every tool that a client may receive. Each is parsed or refused.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

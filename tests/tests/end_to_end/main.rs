@@ -1,5 +1,5 @@
-//! Tests of the whole of Tandem, mostly over HTTP. They are one program, because linking each takes seconds.
-//! Some of them are run by name: `cargo test --workspace --release --test end_to_end experts`.
+//! End-to-end tests of Tandem, mostly over HTTP. They form one program, because linking a program takes
+//! seconds. Run some of them by name: `cargo test --workspace --release --test end_to_end experts`.
 
 mod documents;
 mod episodes;

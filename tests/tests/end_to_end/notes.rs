@@ -1,5 +1,5 @@
-//! Tests of notes over HTTP: authorisation, and that they do not affect an episode; and of calls refused
-//! before they reach an episode.
+//! Tests of notes over HTTP: their authorisation, and that they do not affect an episode. Further tests of
+//! calls refused before they reach an episode.
 
 use serde_json::{Value, json};
 use tandem::hosting::Guests;

@@ -1,4 +1,4 @@
-//! Tests of viewers: they need only the link, see the episode, and have no effect on it.
+//! Tests of viewers: they need only the link, receive the episode, and have no effect on it.
 
 use std::collections::BTreeSet;
 use std::net::TcpStream;
@@ -15,9 +15,9 @@ use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 use crate::policies::plans::{plan, play};
 
 const TOKEN: &str = "correct-horse-battery-staple";
-/// Handover in a kitchen with images on its surfaces.
+/// Scene of Handover in a kitchen with textured surfaces.
 const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen/handover.xml");
-/// Handover on a block of one colour.
+/// Scene of Handover on a block of one colour.
 const BLOCK: &str = r#"<mujoco model="block"><worldbody>
   <geom type="plane" size="3 3 0.1" rgba="0.5 0.5 0.5 1"/>
   <geom type="box" pos="0.37 0 0.78" size="0.2 0.5 0.02" rgba="0.7 0.6 0.5 1"/>
@@ -44,7 +44,7 @@ fn watch(server: &TestServer, id: &str) -> WebSocket<TcpStream> {
     tungstenite::client(request, stream).expect("a socket").0
 }
 
-/// Gets a page with the key of the link.
+/// Requests a page with the key from the viewers' link.
 fn get(server: &TestServer, path: &str) -> (u16, Vec<u8>) {
     let key = format!("Bearer {}", server.watch_key());
     let (status, _, bytes) = server.ask("GET", path, &[("authorization", &key)], b"");
@@ -338,7 +338,7 @@ fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
         "planned": 2, "runs": false, "last_unix_s": complete[0]["last_unix_s"],
     });
     assert_eq!(complete, json!([expected]));
-    // A finished evaluation is not listed as running, even if its folder lacks files.
+    // A finished evaluation is not listed as running, even if files are missing from its folder.
     std::fs::remove_file(folder.join("episodes/handover-2.json")).expect("a result");
     assert_eq!((&list()[0]["played"], &list()[0]["runs"]), (&json!(1), &json!(false)));
     let again = plan(players::find("idle").expect("a player"), vec![1, 2], false);
@@ -354,7 +354,7 @@ fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
     assert_eq!(list()[0]["runs"], json!(false));
 }
 
-/// A page shows one step in five; for an observation it shows the policy's own image.
+/// A page shows every fifth step; for an observation it shows the image that the policy received.
 #[test]
 fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
     let server = TestServer::start();
@@ -374,7 +374,8 @@ fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
     }
 }
 
-/// An agent's notes are shown when they arrive, and so are refusals that do not reach the episode.
+/// An agent's notes are shown as soon as the server receives them, and so are refused calls that do not reach
+/// the episode.
 #[test]
 fn notes_and_refusals_are_seen_as_they_come() {
     let server = TestServer::start();
@@ -409,7 +410,7 @@ fn notes_and_refusals_are_seen_as_they_come() {
     assert_eq!((&told[1]["note"]["text"], &told[3]["ok"]), (&json!("I wait."), &json!(false)));
 }
 
-/// Images on surfaces come by their hashes: once, however many parts show them, for all episodes in a scene.
+/// Textures are requested by hash, once for all parts that show them and for all episodes in a scene.
 #[test]
 fn images_on_surfaces_are_sent_once() {
     let server = TestServer::with(Layer { scene: Some(KITCHEN.into()), ..Layer::default() });
@@ -418,7 +419,7 @@ fn images_on_surfaces_are_sent_once() {
     let textures = heads[0]["textures"].as_array().expect("images");
     assert_eq!(heads[0]["textures"], heads[1]["textures"]);
     let hashes: BTreeSet<&str> = textures.iter().filter_map(|texture| texture["hash"].as_str()).collect();
-    // The images of floor, walls, island and mug, the grid, and the sky.
+    // The textures of floor, walls, island and mug, the grid, and the sky.
     assert_eq!((hashes.len(), textures.len()), (6, 6));
     let parts = heads[0]["parts"].as_array().expect("parts");
     let shown: Vec<u64> = parts.iter().filter_map(|part| part["image"]["texture"].as_u64()).collect();

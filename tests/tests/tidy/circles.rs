@@ -11,8 +11,8 @@ use super::{
 /// Dependencies between the children of one module: from, to, and the first place with such a dependency.
 type Siblings<'a> = BTreeMap<(&'a str, &'a str), &'a str>;
 
-/// Groups dependencies by the parent module. A file and its folder belong together, so two children of one
-/// parent are compared, including all modules below them.
+/// Groups dependencies by the common parent module. Each child includes all modules below it, since a file
+/// and its folder belong together.
 fn levels(arrows: &[Arrow]) -> BTreeMap<&[String], Siblings<'_>> {
     let mut levels: BTreeMap<&[String], Siblings> = BTreeMap::new();
     for Arrow { from, to, place } in arrows {
@@ -24,7 +24,7 @@ fn levels(arrows: &[Arrow]) -> BTreeMap<&[String], Siblings<'_>> {
     levels
 }
 
-/// Returns every dependency that is part of a circle.
+/// Returns every dependency that is part of a cycle.
 fn circles(arrows: &[Arrow]) -> Vec<String> {
     let mut found = Vec::new();
     for (level, siblings) in levels(arrows) {

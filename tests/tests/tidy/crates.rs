@@ -38,7 +38,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Returns the folders of the crates with sources of their own.
+/// Returns the folders of the crates that have their own source files.
 pub fn members() -> impl Iterator<Item = &'static str> {
     ARROWS.iter().map(|(member, _)| *member).filter(|member| root().join(member).join("src").is_dir())
 }
@@ -90,8 +90,8 @@ fn locked(path: &str) -> BTreeMap<String, BTreeSet<String>> {
     versions
 }
 
-/// The program and the wheel use the same versions of crates: the same seed with the same commands must
-/// end in the same state in both.
+/// The program and the wheel use the same versions of crates. The same seed with the same commands must lead
+/// to the same state in both.
 #[test]
 fn the_wheel_is_made_of_the_same_versions() {
     let program = locked("Cargo.lock");

@@ -1,8 +1,8 @@
 //! Tests of the instructions in `docs/src/extending.md`: an extension needs its own file and its line in
 //! a list, and no other change in code.
 //!
-//! Any other list kept by hand would contain the names of all extensions, so no text in the code may be
-//! such a name.
+//! Any other hand-written list would contain the names of extensions, so no text in the code may equal an
+//! extension's name.
 
 use std::path::Path;
 
@@ -17,16 +17,16 @@ use super::{
     sources::{below, expect_none},
 };
 
-/// An extension that the book describes.
+/// A kind of extension that the book describes.
 struct Step {
     /// Name in the book.
     what: &'static str,
     /// Folder of the files.
     folder: &'static str,
     extension: &'static str,
-    /// Text in every file of this kind; the folder may have other files.
+    /// Text that identifies the files of this kind; the folder may contain other files.
     says: &'static str,
-    /// Path prefixes of the code that may name it.
+    /// Path prefixes of the code that may contain the names of extensions of this kind.
     may: &'static [&'static str],
 }
 
@@ -36,8 +36,8 @@ const STEPS: &[Step] = &[
         folder: "episodes/tasks",
         extension: "toml",
         says: "[[phases]]",
-        // An expert plays one task; Handover is the task of the demo and of the example in the tool's
-        // contract.
+        // Each expert plays one task. Handover is the task of the demo and of the example in the tool
+        // interface.
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
@@ -57,8 +57,8 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/objects",
         extension: "xml",
         says: "<mujoco",
-        // Tasks place objects, and experts grip them, and benches use them. The table of MJCF support
-        // has elements and attributes with the same names.
+        // Tasks place objects, experts grasp them, and benches use them. The table of MJCF support has
+        // elements and attributes with the same names.
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
@@ -94,7 +94,7 @@ const STEPS: &[Step] = &[
         folder: "sim/src/render",
         extension: "rs",
         says: "impl Renderer for",
-        // In OpenAPI, "path" is the place of a parameter.
+        // In OpenAPI, "path" is a location of a parameter.
         may: &["sim/src/render/", "tools_spec/src/schema/openapi.rs"],
     },
 ];

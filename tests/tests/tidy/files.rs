@@ -1,4 +1,4 @@
-//! Tests of the number of files in a folder, and of texts that every file must or must not contain.
+//! Tests of the number of files in each folder, and of texts that every file must or must not contain.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,10 +10,10 @@ use super::sources::{everywhere, expect_none, files, root};
 
 const MAX_FILES: usize = 12;
 
-/// Heading in ARCHITECTURE.md of the table of larger folders with reasons.
+/// Heading in ARCHITECTURE.md of the table that justifies larger folders.
 const REASONS: &str = "## Folders with more than twelve files";
 
-/// Returns the folders of the table under [`REASONS`], whose rows are "| `folder` | reason |".
+/// Returns the folders in the table under [`REASONS`], whose rows are "| `folder` | reason |".
 fn with_reason(text: &str) -> BTreeSet<&str> {
     let section = text.split(REASONS).nth(1).unwrap_or_default();
     let section = section.split("\n## ").next().unwrap_or_default();

@@ -41,7 +41,7 @@ fn most_source_files_are_short() {
     );
 }
 
-/// Functions longer than [`LONGEST_FUNCTION_LINES`], from `fn` to the closing brace.
+/// Collector of functions longer than [`LONGEST_FUNCTION_LINES`], from `fn` to the closing brace.
 struct Long<'a> {
     path: &'a Path,
     found: Vec<String>,

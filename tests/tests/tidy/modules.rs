@@ -113,7 +113,7 @@ struct Map<'a> {
     imported: BTreeMap<(&'a Name, String), Name>,
 }
 
-/// Limit on re-export chains, against circles among them.
+/// Maximum length of a chain of re-exports, in case of a cycle.
 const MAX_HOPS: usize = 8;
 
 impl<'a> Map<'a> {
@@ -122,7 +122,8 @@ impl<'a> Map<'a> {
         let mut imported = BTreeMap::new();
         for module in modules {
             for (own, path) in imports(&module.name, &module.items) {
-                // A path with neither `crate` nor `super` starts from a child module or another crate.
+                // A path that begins with neither `crate` nor `super` starts from a child module or another
+                // crate.
                 let path = path.unwrap_or_else(|relative| [module.name.as_slice(), &relative].concat());
                 imported.insert((&module.name, own), path);
             }
@@ -151,7 +152,7 @@ impl<'a> Map<'a> {
     }
 }
 
-/// Makes a crate from texts, for the tests of these invariants.
+/// Builds the modules of a crate from texts, to test the checks of invariants.
 pub fn made_of(files: &[(&str, &str)]) -> Vec<Module> {
     let sources: Vec<Source> = files
         .iter()

@@ -1,4 +1,4 @@
-//! Tests of the order of a crate's modules: each imports only from those before it.
+//! Tests of the order of a crate's modules: each module imports only from earlier modules.
 
 use std::collections::BTreeSet;
 
@@ -7,8 +7,7 @@ use super::{
     sources::expect_none,
 };
 
-/// Top-level modules of each crate, by row. A module may refer to modules of earlier rows only, not of
-/// its own or a later row.
+/// Top-level modules of each crate, by row. A module may refer only to modules of earlier rows.
 const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",

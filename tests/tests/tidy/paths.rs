@@ -1,4 +1,4 @@
-//! Paths in a Rust file.
+//! Extraction of the paths in a Rust file.
 
 use proc_macro2::{TokenStream, TokenTree};
 use syn::{

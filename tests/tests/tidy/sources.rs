@@ -1,14 +1,14 @@
-//! Files of the repository, for the invariants.
+//! Source files of the repository, for the tests of invariants.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Folders with build products and recordings.
+/// Skipped folders, which have build products and recordings.
 const NOT_OURS: [&str; 5] = ["target", "runs", "book", "node_modules", "__pycache__"];
 
-/// A file.
+/// A file of the repository.
 pub struct Source {
     /// Path relative to the root of the repository.
     pub path: PathBuf,

@@ -12,8 +12,7 @@ use super::{
     sources::{Source, below, expect_none, files},
 };
 
-/// Names and lines of all types that a file defines. Associated types belong to their traits, and do not
-/// count.
+/// Names and lines of all types that a file defines, except for associated types of traits.
 #[derive(Default)]
 struct Types {
     found: Vec<(String, usize)>,
@@ -52,7 +51,7 @@ impl<'ast> Visit<'ast> for Types {
     }
 }
 
-/// Returns names of more than one type in a crate, with their places.
+/// Returns the names that several types of a crate share, with their locations.
 fn repeated(sources: &[Source]) -> Vec<String> {
     let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for source in sources {

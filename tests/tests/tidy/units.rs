@@ -9,13 +9,12 @@ use syn::{
 
 use super::{modules::modules, sources::expect_none};
 
-/// Crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in
+/// Crates in which numbers are physical quantities. `ik` is omitted: its vectors hold joint coordinates in
 /// rad or m, and its costs and errors are weighted.
 const CRATES: [&str; 6] =
     ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway/policies", "gateway"];
 
-/// Files with coordinates of any joint, in rad or m as in `ik`, or with rows of a solver or a filter, which
-/// mix units.
+/// Files with joint coordinates in rad or m, or with rows of a solver or a filter, which mix units.
 const GENERALISED: [&str; 7] = [
     "sim/src/dynamics/",
     "sim/src/estimate/covariance.rs",
@@ -103,26 +102,26 @@ const DIMENSIONLESS: &[&str] = &[
     "waves",
     "gain",
     "caution",
-    // Counted in phases.
+    // Rewards, counted in phases.
     "reward",
     "progress",
-    // Arbitrary numbers in conversions and checks, and in ranges whose own names carry the unit.
+    // Arbitrary numbers in conversions and checks, and in ranges whose names include the unit.
     "value",
     "values",
     "median",
     "quartiles",
     "min",
     "max",
-    // An action row of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.
+    // An action row of the tool interface: joints in rad, then the base in m/s, m/s, rad/s and m.
     "row",
     "rows",
     "command",
-    // Units by themselves, as in notes.
+    // Units without a prefix, for example in notes.
     "usd",
     "seconds",
-    // Corners in an image: column and row in pixels, then the interpolated values.
+    // Corners in an image: column and row in pixels, followed by the interpolated values.
     "corners",
-    // A camera's intrinsics in pixels, and its distortion, with the names that every library uses.
+    // A camera's intrinsics in pixels, and its distortion, under their usual names.
     "fx",
     "fy",
     "cx",
@@ -160,7 +159,7 @@ fn is_quantity(kind: &Type) -> bool {
     }
 }
 
-/// Quantities, as fields and parameters, whose names have no unit.
+/// Fields and parameters that are quantities and whose names have no unit.
 #[derive(Default)]
 struct Unnamed {
     found: Vec<(String, usize)>,

@@ -35,7 +35,7 @@ since the start.
 """
 
 CLOCK_S = 20.0
-"""Unit of the clock in seconds, chosen so that an episode lasts about one unit."""
+"""Unit of the clock in seconds, so that an episode lasts about one unit."""
 
 
 @dataclass(frozen=True)

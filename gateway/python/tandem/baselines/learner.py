@@ -27,7 +27,7 @@ MIN_DEVIATIONS = {"states": 0.05, "chunks": 0.05, "objects": 0.02}
 """Lower limits of standard deviations, so that normalisation does not amplify nearly constant inputs."""
 
 BASE_NOISE = (0.03, 0.03, 0.03, 0.01)
-"""Standard deviations of the noise on the base command input, in its own units."""
+"""Standard deviations of the noise on the base command input, in the units of its columns."""
 
 
 def scaled(values: Tensor, scale: Sequence[Tensor]) -> Tensor:
@@ -132,7 +132,7 @@ class Learner:
         self._optimizer.load_state_dict(checkpoint["optimizer"])
 
     def trained(self) -> dict[str, Any]:
-        """Returns the part of the state that is needed to play."""
+        """Returns the part of the state that inference needs."""
         return {
             "views": [[list(view.inputs), list(view.outputs)] for view in self.views],
             "weights": {name: value.cpu() for name, value in self.averaged.items()},

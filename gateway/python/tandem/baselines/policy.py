@@ -1,6 +1,6 @@
 # pyright: basic, reportMissingImports=false
 # PyTorch is an extra that is not installed everywhere, and its types are partly unknown.
-"""A trained policy for playing."""
+"""Inference with a trained policy."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ the last step ends.
 LONGER_STEPS = 12000
 
 WIDE = 2
-"""Range of object poses, as a multiple of the benchmark's, that shows if a policy uses its images."""
+"""Range of object poses, as a multiple of the benchmark's, that shows whether a policy uses its images."""
 
 WIDER = {"handover": 4, "co_pouring": 4, "co_carry": 4}
 """Larger ranges for tasks that one demonstration, replayed blindly, solves too often at `WIDE`."""
@@ -62,7 +62,7 @@ def run_recipe(
     *,
     tell: Callable[[str], None] = print,
 ) -> Path:
-    """Makes all missing parts, command by command, and returns the report, which includes the folder's other
+    """Creates all missing parts, command by command, and returns the report, which includes the folder's other
     policies. An interrupted recipe is continued.
 
     Args:

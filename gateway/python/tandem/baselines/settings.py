@@ -28,10 +28,10 @@ class TrainingSettings:
     """Sharing of weights: "shared" is one set for all robots; "separate" is one set for each."""
 
     steps: int = 5000
-    """Number of steps of the optimiser."""
+    """Number of optimiser steps."""
 
     batch: int = 32
-    """Number of moments per step."""
+    """Batch size: number of moments per step."""
 
     chunk_rows: int = 10
     """Number of action rows in an answer, at the data set's rate."""
@@ -64,7 +64,7 @@ class TrainingSettings:
     """Standard deviation of noise on the time since the episode began."""
 
     averaging: float = 0.995
-    """Factor of the exponential moving average of weights; the averaged weights are the ones that play."""
+    """Factor of the exponential moving average of weights. Inference uses the averaged weights."""
 
     seed: int = 0
     """Seed of the weights, the order of the moments and the noise."""

@@ -9,14 +9,14 @@ use crate::commands::CommandResult;
 #[derive(Debug, clap::Args)]
 pub struct ExamplesArgs {}
 
-/// Folder of the examples, here and in the repository.
+/// Folder of the examples, in the working folder and in the repository.
 const FOLDER: &str = "gateway/examples";
 
 macro_rules! examples {
     ($($path:literal)*) => { [$(($path, include_str!(concat!("../../../examples/", $path)))),*] };
 }
 
-/// Every example, by its path in the folder, with its text.
+/// All examples: the path in the folder, and the text.
 const EXAMPLES: [(&str, &str); 36] = examples! {
     "agents/agent.py"
     "agents/claude.sh"

@@ -15,7 +15,7 @@ pub struct ManArgs {
     out: Option<PathBuf>,
 }
 
-/// Prints the page of `command`, or writes its page and those of all subcommands.
+/// Prints the manual page of `command`, or writes its page and the pages of all subcommands.
 pub fn run(args: ManArgs, command: Command) -> CommandResult {
     let Some(folder) = args.out else {
         let mut page = Vec::new();

@@ -8,7 +8,7 @@ pub mod tasks;
 
 use std::path::Path;
 
-/// Returns the path of a file as another file names it: relative to the other file's folder, if it is inside.
+/// Returns the path of `file` as the file `by` names it: relative to the folder of `by` if it is inside.
 fn seen_from(by: &Path, file: &Path) -> String {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
     let (by, file) = (absolute(by), absolute(file));

@@ -32,7 +32,7 @@ struct NewRobotArgs {
     out: PathBuf,
 }
 
-/// Writes a draft of a description.
+/// Writes a draft of a robot's description.
 pub fn run(args: &RobotsArgs) -> CommandResult {
     let RobotsAction::New(NewRobotArgs { from_model, out }) = &args.action;
     if out.exists() {

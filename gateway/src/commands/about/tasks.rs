@@ -1,5 +1,5 @@
-//! `tandem tasks`: the list of tasks; `tandem tasks check`: validation of the user's own task;
-//! `tandem tasks new`: a task to start from.
+//! `tandem tasks`: the list of tasks. `tandem tasks check`: validation of the user's own task. `tandem tasks
+//! new`: a task to start from.
 
 use std::{
     fmt::Write,
@@ -132,7 +132,7 @@ fn new(args: &NewArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the id of a task by the name of its file.
+/// Derives the id of a task from the name of its file.
 fn id_of(task: &Path) -> String {
     const LONGEST_ID: usize = 40;
     let stem = task.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();

@@ -1,4 +1,4 @@
-//! The machine on which a figure was measured.
+//! Description of the machine on which a figure was measured.
 
 use std::{fs, path::Path};
 
@@ -26,7 +26,7 @@ pub struct WithMachine<R> {
 }
 
 impl<R> WithMachine<R> {
-    /// Adds this machine and its present load to `report`.
+    /// Adds this machine and its current load to `report`.
     pub fn here(report: R) -> WithMachine<R> {
         WithMachine { machine: BenchMachine::here(), report }
     }

@@ -97,7 +97,7 @@ enum BenchPart {
 /// A function that measures a part, prints a table, and returns the report as JSON.
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
-/// Parts that `bench all` measures; a new part adds its line.
+/// Parts that `bench all` measures. A new part needs a line here.
 const PARTS: [(&str, Measure); 6] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu, CameraModel::Ideal)?)?)),
@@ -111,7 +111,7 @@ const PARTS: [(&str, Measure); 6] = [
     ("falls", || Ok(serde_json::to_value(measure_falls(FALLS_EPISODES, "")?)?)),
 ];
 
-/// Default number of episodes: four of each case.
+/// Default number of episodes: four for each case.
 const FALLS_EPISODES: usize = 60;
 
 /// Measures a part and prints a table.
@@ -145,7 +145,7 @@ fn all(json: Option<&Path>) -> CommandResult {
     write(reports, json)
 }
 
-/// Writes a report with its machine, if a file is named.
+/// Writes a report with a description of the machine, if a file is named.
 fn write(report: impl Serialize, json: Option<&Path>) -> CommandResult {
     if let Some(path) = json {
         WithMachine::here(report).write(path)?;

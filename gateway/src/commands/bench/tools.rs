@@ -1,4 +1,4 @@
-//! `tandem bench tools`: overhead of a call beside its physics, over real HTTP on this machine.
+//! `tandem bench tools`: overhead of a call beyond its physics, over real HTTP on this machine.
 
 use std::{
     error::Error,
@@ -18,11 +18,11 @@ use crate::{
 
 /// Number of timed calls of each kind.
 const CALLS: usize = 2000;
-/// Number of warm-up calls before them.
+/// Number of warm-up calls before the timed calls.
 const WARM_UP: usize = 100;
-/// Number of timed calls of `wait`; an episode of the benchmark protocol has enough steps for them.
+/// Number of timed calls of `wait`. An episode of the benchmark protocol has enough control steps for them.
 const WAITS: usize = 30;
-/// Control steps of each wait.
+/// Number of control steps of each call of `wait`.
 const STEPS: u32 = 25;
 
 /// Times of calls in an episode of two robots, which is recorded as usual.
@@ -30,35 +30,35 @@ const STEPS: u32 = 25;
 pub struct ToolsReport {
     /// Times of calls without physics.
     pub calls: Vec<CallTimes>,
-    /// Times of `wait`, compared with its physics.
+    /// Times of `wait`, compared with the time of its physics.
     pub wait: WaitTimes,
 }
 
-/// Times of one tool, from the first byte sent to the reply read.
+/// Times of one tool, from the first byte sent until the reply is read.
 #[derive(Debug, Serialize)]
 pub struct CallTimes {
     /// Name of the tool.
     pub tool: &'static str,
     /// Number of calls.
     pub calls: usize,
-    /// Median, in milliseconds.
+    /// Median time of a call, in milliseconds.
     pub p50_ms: f64,
-    /// The 99th percentile, in milliseconds.
+    /// The 99th percentile of the time of a call, in milliseconds.
     pub p99_ms: f64,
 }
 
 /// Times of `wait` with [`STEPS`] steps.
 #[derive(Debug, Serialize)]
 pub struct WaitTimes {
-    /// Control steps of each call.
+    /// Number of control steps of each call.
     pub steps: u32,
     /// Number of calls.
     pub calls: usize,
-    /// Median of the whole call, in milliseconds.
+    /// Median time of a whole call, in milliseconds.
     pub call_p50_ms: f64,
-    /// Median of its physics, in milliseconds.
+    /// Median time of a call's physics, in milliseconds.
     pub physics_p50_ms: f64,
-    /// Median of the ratio of both, call by call.
+    /// Median over calls of the whole time divided by the physics time.
     pub p50_ratio: f64,
 }
 
@@ -118,7 +118,7 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// Returns the smallest of `values` that at least a fraction `share` of them do not exceed.
+/// Returns the smallest of `values` that at least the fraction `share` of the values do not exceed.
 fn percentile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let rank = (share * values.len() as f64).ceil() as usize;

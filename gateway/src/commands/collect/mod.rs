@@ -53,7 +53,7 @@ fn parse_level(text: &str) -> Result<f32, String> {
     level.ok_or_else(|| format!("no level; give 0 to {}, for example 1", Variation::MAX_DISTURB))
 }
 
-/// Plays and records.
+/// Plays and records the demonstrations.
 pub fn run(args: CollectArgs) -> CommandResult {
     log_evaluation();
     let plan = args.episodes.plan(players::find("expert")?, true, Assistance::Full)?;

@@ -23,7 +23,7 @@ use crate::{
 /// Port number that makes the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// Time that an episode waits for its people to begin, and to come back.
+/// Time that an episode waits for its operators to begin, and to return.
 const IDLE_S: u32 = 3600;
 
 /// Flags for demonstrations of people.
@@ -55,8 +55,8 @@ impl PeopleFlags {
         self.operators
     }
 
-    /// Lets people play the episodes of `plan` that are not in `folder` yet. Bad ones are moved to a
-    /// folder beside it.
+    /// Lets people play the episodes of `plan` that are not in `folder` yet. Episodes that are marked bad are
+    /// moved to a folder beside it.
     pub fn collect(self, plan: EvaluationPlan, folder: &Path) -> Result<(), Box<dyn Error>> {
         let robots = robots_of(&plan.tasks, self.operators)?;
         let people = People::start(self.settings(&plan, folder)?, &robots, planned(&plan), aside(folder))?;
@@ -66,11 +66,11 @@ impl PeopleFlags {
         played.map(drop)
     }
 
-    /// Returns the settings of a server for these episodes alone.
+    /// Returns the settings of a server that hosts only these episodes.
     fn settings(self, plan: &EvaluationPlan, folder: &Path) -> Result<Settings, Box<dyn Error>> {
         let listen = self.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT)));
         let flags = Layer {
-            // The address is set below, where the server has its token.
+            // The address is set below, together with the token.
             allowed_host: self.allowed_host.map(|name| vec![name]),
             tls_cert: self.tls_cert,
             tls_key: self.tls_key,
@@ -97,7 +97,7 @@ impl PeopleFlags {
     }
 }
 
-/// Returns the robots of all these tasks, one for each of `operators`.
+/// Returns the robots that all these tasks share, one for each of `operators`.
 fn robots_of(tasks: &[Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
     let wanted = usize::from(operators.unwrap_or_default());
     if let Some(task) = tasks.iter().find(|task| task.robots.len() != wanted) {
@@ -114,7 +114,8 @@ fn planned(plan: &EvaluationPlan) -> Vec<(String, u32)> {
     plan.episodes().0.iter().map(|spec| (spec.task.id.clone(), spec.seed)).collect()
 }
 
-/// Returns the folder for bad episodes. It is beside the run's folder, so that no data set includes them.
+/// Returns the folder for bad episodes. It is beside the folder of the run, so that no data set includes
+/// them.
 fn aside(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().map_or_else(OsString::new, OsString::from);
     name.push("-bad");

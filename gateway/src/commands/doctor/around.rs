@@ -12,7 +12,7 @@ use tandem_episodes::RendererKind;
 use super::{Finding, Findings};
 use crate::{drivers::interpreter, settings::Layer};
 
-/// Extras of the wheel that users miss most, with the modules that each installs.
+/// Extras of the wheel that users most often lack, with the modules that each installs.
 pub(super) const EXTRAS: [(&str, &[&str]); 4] = [
     ("agents", &["anthropic", "openai"]),
     ("gym", &["gymnasium"]),
@@ -20,7 +20,8 @@ pub(super) const EXTRAS: [(&str, &[&str]); 4] = [
     ("baselines", &["av", "pyarrow", "torch"]),
 ];
 
-/// Python script whose arguments are modules. It prints Python's version and the modules that are installed.
+/// Python script that takes modules as arguments. It prints Python's version and the modules that are
+/// installed.
 const LOOK: &str = "import importlib.util, platform, sys
 found = [name for name in sys.argv[1:] if importlib.util.find_spec(name)]
 if 'tandem' in found: import tandem
@@ -30,15 +31,15 @@ print(platform.python_version(), *found)";
 pub(super) const MIN_FREE_BYTES: u64 = 5_000_000_000;
 /// Lower limit for a correct clock: the beginning of 2026, when this program was written.
 pub(super) const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
-/// Tolerated difference between the clocks of the build machine and this one.
+/// Tolerated difference between the clocks of the build machine and this machine.
 const MAX_DRIFT: Duration = Duration::from_secs(86_400);
 
-/// Hosts that clients on this machine use for a server on it.
+/// Names by which clients on this machine reach a server on it.
 const LOOPBACK: [&str; 2] = ["127.0.0.1", "localhost"];
-/// Variables that make clients ask a proxy. Many programs read them in lower case, too.
+/// Variables that make clients use a proxy. Many programs also read them in lower case.
 const PROXIES: [&str; 3] = ["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"];
 
-/// Checks the environment of the program. Episodes run without it, except for a correct date and free space.
+/// Checks the environment of the program. Episodes need none of it, except for a correct date and free space.
 pub fn check(layer: &Layer) -> Findings {
     vec![
         (RendererKind::Gpu.name(), gpu(layer.renderer())),
@@ -50,7 +51,7 @@ pub fn check(layer: &Layer) -> Findings {
     ]
 }
 
-/// Reports the renderer of `--renderer gpu`, unless it is the server's and therefore reported already.
+/// Reports the renderer of `--renderer gpu`, unless the server uses it and it is therefore already reported.
 fn gpu(chosen: RendererKind) -> Finding {
     let embedded = RendererKind::Cpu.describe().unwrap_or_default();
     match RendererKind::Gpu.describe() {
@@ -77,7 +78,7 @@ pub(super) fn ffmpeg(program: &str) -> Finding {
     }
 }
 
-/// Asks a Python interpreter for the package and its extras.
+/// Checks a Python interpreter for the package and its extras.
 pub(super) fn python(interpreter: &str) -> Finding {
     let modules = EXTRAS.iter().flat_map(|(_, modules)| *modules);
     let output = Command::new(interpreter).args(["-c", LOOK, "tandem"]).args(modules).output();
@@ -100,7 +101,7 @@ pub(super) fn python(interpreter: &str) -> Finding {
     }
 }
 
-/// Reads the answer of [`LOOK`].
+/// Parses the output of [`LOOK`].
 pub(super) fn installed(interpreter: &str, answer: &str) -> Finding {
     let mut words = answer.split_whitespace();
     let version = words.next().unwrap_or_default();
@@ -126,7 +127,7 @@ pub(super) fn installed(interpreter: &str, answer: &str) -> Finding {
     Finding::Works(text)
 }
 
-/// Checks that clients on this machine reach a server on it without a proxy. Proxies' addresses may hold
+/// Checks that clients on this machine reach a server on it without a proxy. Addresses of proxies may contain
 /// passwords, so only the variables are named.
 pub(super) fn proxy(variable: impl Fn(&str) -> Option<String>) -> Finding {
     let value = |name: &str| {
@@ -151,7 +152,7 @@ pub(super) fn proxy(variable: impl Fn(&str) -> Option<String>) -> Finding {
     }
 }
 
-/// Judges the free space for recordings.
+/// Checks that the free space suffices for recordings.
 pub(super) fn disk(free_bytes: Option<u64>) -> Finding {
     let Some(free_bytes) = free_bytes else {
         return Finding::Note(
@@ -167,7 +168,7 @@ pub(super) fn disk(free_bytes: Option<u64>) -> Finding {
     }
 }
 
-/// Returns the free space where a folder is, or will be.
+/// Returns the free space on the disk of a folder, which need not exist yet.
 #[cfg(unix)]
 pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     let absolute = std::path::absolute(folder).ok()?;
@@ -176,7 +177,7 @@ pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     system.f_bavail.checked_mul(system.f_frsize)
 }
 
-/// Returns `None`: other systems have no portable call for it.
+/// Returns `None`, because other systems have no portable call for the free space.
 #[cfg(not(unix))]
 pub(super) fn free_bytes(_: &Path) -> Option<u64> {
     None
@@ -187,7 +188,7 @@ fn built() -> Option<SystemTime> {
     std::env::current_exe().ok()?.metadata().ok()?.modified().ok()
 }
 
-/// Checks that the date is not before the program's: results and recordings name it.
+/// Checks that the system date, which results and recordings contain, is not before the build date.
 pub(super) fn date(now: SystemTime, built: Option<SystemTime>) -> Finding {
     let earliest = built.into_iter().fold(UNIX_EPOCH + PROGRAM_DATE, SystemTime::max);
     match earliest.duration_since(now) {

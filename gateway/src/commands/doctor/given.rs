@@ -59,7 +59,7 @@ fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<St
     }
 }
 
-/// Reports the approximations in a robot's file, whether it stands, and the tasks that such robots can play.
+/// Reports the approximations in a robot's file, whether the robot stands, and the tasks that it can play.
 fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     let (robot, approximations) = match RobotFile::with_approximations(path) {
         Ok(read) => read,
@@ -77,7 +77,7 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     };
     let mut findings: Vec<Finding> =
         approximations.iter().map(|line| Finding::Note(format!("not quite as in MuJoCo: {line}"))).collect();
-    // The first task shows for all ten whether hands and controller fit.
+    // The first task suffices to check for all ten that hands and controller fit.
     findings.push(Finding::Works(format!("{} is read", path.display())));
     match check_robot(&robot) {
         Ok(check) => {
@@ -94,8 +94,8 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     findings
 }
 
-/// Reports the approximations in a scene's file, and the tasks that can be played there. A scene is made for
-/// a few tasks, so only a scene without any task is an error.
+/// Reports the approximations in a scene's file, and the tasks that can be played in the scene. A scene is
+/// made for a few tasks, so it is an error only if no task can be played.
 fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
     let approximations = match SceneFile::with_approximations(path) {
         Ok((_, approximations)) => approximations,
@@ -109,7 +109,7 @@ fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
             Ok(()) => playable.push(spec.task.id.clone()),
             Err(error) => {
                 let text = error.to_string();
-                // Without the site for the task's origin, no task has a place.
+                // Without the site for the task's origin, no task can be placed.
                 if matches!(&error, EpisodeError::Scene(scene) if matches!(**scene, SceneError::NoPlace { .. }))
                 {
                     findings.push(Finding::Wrong(format!("no task can be played: {text}")));

@@ -17,7 +17,7 @@ use crate::{hosting::look_at_runs_folder, settings::Layer};
 const TRIED_STEPS: u32 = 25;
 /// Real-time factor below which a call that simulates takes longer than the motion of its robots.
 const MIN_REALTIME_FACTOR: f64 = 1.0;
-/// Maximum tick of a clock that can time calls.
+/// Maximum resolution step of a clock that can time calls.
 const COARSEST_TICK: Duration = Duration::from_millis(1);
 /// Minimum number of cores. With fewer cores, episodes wait for each other.
 const MIN_CORES: usize = 2;

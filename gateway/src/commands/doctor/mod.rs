@@ -1,5 +1,5 @@
-//! `tandem doctor`: checks which of a server's settings work on this machine, with advice on those that
-//! do not.
+//! `tandem doctor`: checks whether a server's settings work on this machine, and advises on those that do
+//! not.
 
 mod around;
 mod given;
@@ -68,7 +68,7 @@ fn told(findings: &Findings) -> String {
 /// Runs all checks, even after failures.
 fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     let mut findings = Findings::new();
-    // As in the server, a token in the environment precedes that of the file.
+    // As in the server, a token in the environment takes precedence over the token in the file.
     let flags = Layer { token: token.clone().ok().flatten(), ..args.flags };
     let layer = match &args.config {
         None => flags,
@@ -92,7 +92,8 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     findings
 }
 
-/// Returns every task with this server's settings, as far as their files can be read.
+/// Returns an episode of each benchmark task with this server's settings. Files that cannot be read are
+/// ignored.
 fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = layer.scene.as_deref().map(SceneFile::of);
     let scene = scene.and_then(Result::ok);
@@ -110,8 +111,8 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     })
 }
 
-/// Builds the world of an episode. In a custom scene this includes a second without commands, unless that has
-/// been tried before.
+/// Builds the world of an episode. In a custom scene, this includes a second without commands, unless that
+/// was tried before.
 fn trial(spec: &EpisodeSpec) -> Result<(), EpisodeError> {
     build_world(spec).map(drop)
 }

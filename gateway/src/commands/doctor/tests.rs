@@ -1,4 +1,4 @@
-//! Tests of `doctor`: it finds settings that would not work, and advises on settings that would.
+//! Tests of `doctor`: its findings on settings that work and on settings that do not.
 
 use std::{
     fs,

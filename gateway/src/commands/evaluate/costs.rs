@@ -1,4 +1,4 @@
-//! Costs of language models: the limit of a whole run, and the estimated cost of a run.
+//! Costs of language models: a limit on the whole run, and an estimate of the cost of a run.
 
 use std::{
     error::Error,
@@ -17,7 +17,7 @@ use tandem_tools_spec::Usage;
 
 use crate::commands::flags::PolicyPrices;
 
-/// A policy that begins no further episode once the run might cost more than a limit.
+/// A policy that begins no further episode if the cost of the run might then exceed a limit.
 #[derive(Debug)]
 pub struct SpendingLimit {
     policy: Box<dyn Policy>,
@@ -26,11 +26,11 @@ pub struct SpendingLimit {
     spent: Mutex<Spent>,
 }
 
-/// Costs of a run up to now, in US dollars.
+/// Costs of a run so far, in US dollars.
 #[derive(Debug, Default)]
 struct Spent {
     usd: f64,
-    /// Cost of the dearest episode.
+    /// Cost of the most expensive episode so far.
     dearest_usd: f64,
     /// Number of episodes that are being played.
     under_way: u32,
@@ -63,7 +63,7 @@ impl SpendingLimit {
     ///
     /// # Errors
     ///
-    /// [`PlayError::Absent`] if the costs of the run might then exceed the limit.
+    /// [`PlayError::Absent`] if the cost of the run might then exceed the limit.
     fn begin(&self) -> Result<(), PlayError> {
         let mut spent = self.spent();
         let next_usd = spent.dearest_usd * f64::from(spent.under_way + 1);
@@ -115,12 +115,12 @@ impl Policy for SpendingLimit {
     }
 }
 
-/// Describes the costs of `episodes` episodes at these prices, if each used as many tokens as those in
+/// Describes the cost of `episodes` episodes at these prices, if each uses as many tokens as the episodes in
 /// `folder` did on average.
 ///
 /// # Errors
 ///
-/// If the folder cannot be read, or none of its episodes was played by a model.
+/// Fails if the folder cannot be read, or if a model played none of its episodes.
 pub fn expected(episodes: usize, folder: &Path, prices: &PolicyPrices) -> Result<String, Box<dyn Error>> {
     let loaded = load(&[PathBuf::from(folder)])?;
     let used: Vec<&Usage> =
@@ -146,7 +146,7 @@ fn in_words(episodes: usize, used: &[&Usage], prices: &PolicyPrices) -> String {
         mean(|usage| usage.cached_tokens),
         mean(|usage| usage.output_tokens)
     );
-    // Prices that are given replace the recorded ones.
+    // Given prices replace the recorded ones.
     let usd: Option<f64> = used.iter().map(|usage| prices.usd(usage).or(usage.usd)).sum();
     let price = match usd.map(|usd| usd / used.len() as f64) {
         Some(usd) => {
@@ -198,7 +198,8 @@ mod tests {
         let free = PolicyPrices::default();
         let uncached = "usd-per-million-input=2&usd-per-million-output=10";
         let (unpriced, priced) = (usage(None), usage(Some(3.0)));
-        // 0.5 million fresh tokens, 1.5 million cached ones and 10,000 written ones: 1 + 0.3 + 0.1.
+        // Uncached input is 0.5 million tokens, cached input 1.5 million, and output 10,000: 1 + 0.3 + 0.1
+        // dollars.
         let given = prices(&format!("{uncached}&usd-per-million-cached=0.2"));
         check(&[&priced, &unpriced], &given, "1.40 US dollars an episode, 42.00 for all");
         check(&[&unpriced], &prices(uncached), "4.10 US dollars an episode, 123.00 for all");

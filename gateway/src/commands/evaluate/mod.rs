@@ -1,4 +1,4 @@
-//! `tandem evaluate`: a policy's success over tasks and seeds.
+//! `tandem evaluate`: the success rates of a policy over tasks and seeds.
 
 mod costs;
 mod progress;
@@ -88,7 +88,7 @@ pub struct EvaluateArgs {
     run: RunFlags,
 }
 
-/// Phases on the command line.
+/// Phases given on the command line.
 #[derive(Debug, Clone)]
 struct PhaseList(Vec<String>);
 
@@ -119,7 +119,7 @@ fn phases_of(PhaseList(names): PhaseList, tasks: &[Task]) -> Result<Vec<String>,
     }
 }
 
-/// A share on the command line.
+/// A share given on the command line.
 #[derive(Debug, Clone, Copy)]
 struct ShardFlag(Shard);
 
@@ -136,7 +136,8 @@ impl FromStr for ShardFlag {
     }
 }
 
-/// Plays and counts. The program fails if there are episodes to play, but none that counts.
+/// Plays the episodes and counts the results. The program fails if there are episodes to play, but none that
+/// counts.
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let ShardFlag(shard) = args.shard;
@@ -191,7 +192,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     })
 }
 
-/// Returns the seeds that are played: the plan's, or those of the training demonstrations.
+/// Returns the seeds that are played: the seeds of the plan, or those of the training demonstrations.
 fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
     let Starts::Phases { demonstrations, training: true, .. } = starts else { return Ok(plan.seeds.clone()) };
     let mut seeds = BTreeSet::new();
@@ -206,7 +207,7 @@ fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
     }
 }
 
-/// Refuses the combination of two different rewordings of tasks.
+/// Refuses a plan that combines two different rewordings of tasks.
 pub fn check_words(
     plan: &EvaluationPlan,
     stresses: impl IntoIterator<Item = Stress>,
@@ -232,7 +233,7 @@ fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
     Ok(Starts::Moments { failed, before_s })
 }
 
-/// Plays `plan` into `folder`, reports progress, prints a table, and returns how many of the episodes
+/// Plays `plan` into `folder`, reports progress and prints a table. Returns the number of episodes that
 /// count.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let run = EvaluationRun::begin(plan, folder)?;
@@ -264,7 +265,7 @@ fn in_words(kept: KeptEpisodes) -> String {
     words
 }
 
-/// Prints the results up to now and the command to continue, for a run that a signal ends.
+/// Prints the results so far and the command to continue, for a run that a signal ends.
 fn print_interrupted(run: &EvaluationRun) {
     let KeptEpisodes { kept, to_play, .. } = run.kept();
     println!("\ninterrupted; {kept} episodes are kept, {to_play} are left");

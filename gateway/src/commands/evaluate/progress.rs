@@ -1,4 +1,4 @@
-//! Progress of an evaluation: a bar on a terminal, or a line a minute in the log.
+//! Progress of an evaluation: a bar on a terminal, or a line in the log every minute.
 
 use std::{
     sync::{Mutex, MutexGuard, mpsc},
@@ -16,17 +16,17 @@ const TICK: Duration = Duration::from_secs(1);
 /// Interval between two progress lines in the log.
 const LINE_EVERY: Duration = Duration::from_secs(60);
 
-/// Delays of the log lines about a wait for the policy: the first, and the interval after that. After a
-/// minute, there is one a minute.
+/// Delays of the log lines about a wait for the policy: the first delay, and the interval after that. After a
+/// minute, the interval is a minute.
 const WAIT_FIRST: Duration = Duration::from_secs(2);
 const WAIT_EVERY: Duration = Duration::from_secs(10);
 
-/// Runs `work` with a callback for events of episodes, and meanwhile reports the progress of the episodes
-/// of `plan`.
+/// Runs `work` with a callback for events of episodes, and reports the progress of the episodes of `plan`
+/// while it runs.
 pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(EpisodeEvent) + Sync)) -> T) -> T {
     let tally = Mutex::new(Tally { planned: plan.episodes().0.len(), ..Tally::default() });
     let lock = || -> MutexGuard<'_, Tally> {
-        // Counting leaves every count valid.
+        // The counts stay valid even if a thread panics while it holds the lock.
         tally.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     };
     let began = Instant::now();
@@ -80,7 +80,7 @@ struct Tally {
     /// Number of episodes that this run has played or tried to play.
     played: usize,
     left_out: usize,
-    /// Number of episodes of both runs that do not count.
+    /// Number of episodes of this and the earlier run that do not count.
     excluded: usize,
     /// Number of episodes that count and have not succeeded.
     failed: usize,
@@ -172,10 +172,10 @@ struct Schedule {
 }
 
 impl Schedule {
-    /// Returns the lines that are due after `elapsed`, when the policy has been waited for as long as
-    /// `waited`.
+    /// Returns the lines that are due after `elapsed`. `waited` is the time for which the policy has been
+    /// waited for.
     fn due(&mut self, elapsed: Duration, waited: Option<Duration>) -> impl Iterator<Item = DueLine> {
-        // A wait that is shorter than before is a new one.
+        // A wait that is shorter than before is a new wait.
         self.wait = self.wait.filter(|told| waited.is_some_and(|waited| waited >= *told));
         let next_wait = match self.wait {
             None => WAIT_FIRST,
@@ -234,7 +234,7 @@ mod tests {
         let first: Vec<u32> = (1..=200).filter(|s| said(*s, Some(*s))).collect();
         assert_eq!(first, [2, 12, 22, 32, 42, 52, 62, 122, 182]);
         assert!(!said(201, None));
-        // The next wait is a new one.
+        // A shorter wait counts as a new wait.
         assert_eq!((202..=220).filter(|s| said(*s, Some(*s - 201))).collect::<Vec<_>>(), [203, 213]);
     }
 

@@ -13,7 +13,7 @@ use tandem_tools_spec::{AgentEnding, Usage};
 /// Minimum share of clamped joint targets that causes a warning.
 const CLAMPED_SHARE: f64 = 0.1;
 
-/// Maximum number of notes of a kind below the table.
+/// Maximum number of notes of each kind below the table.
 const NOTES_SHOWN: usize = 20;
 
 /// Prints the tables, then notes.
@@ -41,7 +41,7 @@ pub fn print(evaluation: &Evaluation) {
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {}", printable(left_out)));
 }
 
-/// Warns of tasks in whose episodes many joint targets were beyond the joints' limits.
+/// Warns of tasks in which many joint targets were beyond the joints' limits.
 fn print_clamped(evaluation: &Evaluation) {
     let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for PlayedEpisode { result, .. } in &evaluation.episodes {
@@ -150,7 +150,7 @@ fn print_endings(evaluation: &Evaluation) {
     );
 }
 
-/// Prints how often each phase was reached from its own start, and how much lower the rate of
+/// Prints how often each phase was reached when play started there, and how much lower the rate of
 /// collaborative phases is.
 fn print_phase_level(level: &PhaseLevel) {
     println!("{:14} {:>8}  {:>8}  {:^22}", "task", "from", "episodes", "reached");

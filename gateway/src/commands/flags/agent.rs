@@ -1,18 +1,18 @@
-//! The flags for the choice and the limits of a language model. They are those of `python -m
-//! tandem.agent`, which parses them.
+//! The flags for the choice and the limits of a language model. `python -m tandem.agent` has the same flags
+//! and parses them.
 
 use std::iter;
 
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
 
-/// Part of a program's time limit after which a model finishes without being stopped, in twelfths.
+/// Share of a program's time limit after which a model finishes its play itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
 
 /// Flags whose values are strings, even if they look like numbers.
 const TEXTS: [&str; 4] = ["model", "api", "base-url", "effort"];
 
-/// Time after the model's own limit at which it is stopped.
+/// Time after the model's own time limit at which the program is stopped.
 const GRACE_S: u32 = 300;
 
 /// A language model.
@@ -86,8 +86,8 @@ impl AgentPrices {
         self.input_usd.is_some() && self.output_usd.is_some()
     }
 
-    /// Returns the price of input, the part of it that was cached, and output tokens; `None` without the
-    /// prices of input and output. Writing to a cache is priced as reading.
+    /// Returns the price of the numbers of input tokens, cached input tokens and output tokens. `None`
+    /// without the prices of input and output. Writing to a cache is priced as reading.
     pub fn usd(&self, [input, cached, output]: [u64; 3]) -> Option<f64> {
         let (input_usd, output_usd) = (self.input_usd?, self.output_usd?);
         let cached_usd = self.cached_usd.unwrap_or(input_usd);
@@ -154,12 +154,12 @@ impl AgentFlags {
         }
     }
 
-    /// Returns the time limit of a program whose default is `usual_s`.
+    /// Returns the time limit of a program whose default limit is `usual_s`.
     pub fn limit_s(&self, usual_s: u32) -> u32 {
         usual_s.max(self.max_seconds.map_or(0, |own_s| own_s.saturating_add(GRACE_S)))
     }
 
-    /// Returns the arguments for Python if the program is stopped after `limit_s`.
+    /// Returns the arguments for Python, for a program that is stopped after `limit_s`.
     pub fn arguments(&self, limit_s: u32) -> Vec<String> {
         let own_s = self.max_seconds.unwrap_or((limit_s / 12 * OWN_TWELFTHS).max(1));
         let own_s = ("max-seconds", Some(own_s.to_string()));

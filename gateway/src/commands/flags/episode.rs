@@ -60,12 +60,12 @@ pub struct EpisodeFlags {
     world: WorldFlags,
 }
 
-/// Tasks on the command line. The type's name keeps clap from taking it for a flag that can be given
-/// several times.
+/// Tasks given on the command line. The separate type keeps clap from treating them as a flag that can be
+/// given several times.
 #[derive(Debug, Clone)]
 struct TaskList(Vec<Task>);
 
-/// Parses built-in tasks: `all` of the benchmark's, those of a suite, or ids separated by commas.
+/// Parses built-in tasks: `all` tasks of the benchmark, the name of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
         "all" => Ok(tasks::cohub().to_vec()),
@@ -79,8 +79,8 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
     found.map(TaskList).map_err(told)
 }
 
-/// Returns the tasks to play: those of files, and the named built-in ones that no file replaces. Without
-/// any, it returns all tasks of the benchmark.
+/// Returns the tasks to play: the tasks of files, and the named built-in tasks that no file replaces. Without
+/// either, returns all tasks of the benchmark.
 fn played(named: Option<TaskList>, of_files: Vec<Task>) -> Vec<Task> {
     let named = match named {
         Some(TaskList(named)) => named,
@@ -93,7 +93,7 @@ fn played(named: Option<TaskList>, of_files: Vec<Task>) -> Vec<Task> {
 }
 
 impl EpisodeFlags {
-    /// Returns the plan for `player` to play these episodes; `assistance` is the default.
+    /// Returns the plan for `player` to play these episodes; `assistance` is the default assistance.
     pub fn plan(
         self,
         player: &dyn Policy,
@@ -144,7 +144,7 @@ impl EpisodeFlags {
     }
 }
 
-/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends
+/// Seeds given on the command line, for every command with seeds: `3`, `0-9` or `0..9`, with both ends
 /// included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);

@@ -1,13 +1,13 @@
-//! The flags that the user has given, as opposed to defaults.
+//! The flags that the user has given, without defaults.
 
 use std::collections::BTreeMap;
 
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, parser::ValueSource};
 
-/// The flags of a subcommand that come from the command line or the environment, by id, with their texts.
+/// Flags of a subcommand that come from the command line or the environment: their values by id.
 ///
-/// It has to be the first field of the subcommand's flags, because parsing another field removes its
-/// flags from the matches.
+/// This has to be the first field of the subcommand's flags, because parsing another field removes its flags
+/// from the matches.
 #[derive(Debug)]
 pub struct GivenFlags(BTreeMap<String, Vec<String>>);
 

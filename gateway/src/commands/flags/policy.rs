@@ -61,7 +61,7 @@ pub struct PolicyFlags {
     policy_name: Option<String>,
 }
 
-/// A policy on the command line.
+/// A policy given on the command line.
 #[derive(Clone, Debug)]
 enum PolicyChoice {
     Player(&'static players::PlayerEntry),
@@ -122,7 +122,7 @@ fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, Strin
             Some(rest) if rest.split('/').next().is_some_and(|authority| authority.contains('@')) => {
                 Err("an address takes no key; give it by --policy-key-file or TANDEM_POLICY_KEY".into())
             }
-            // The default port of the web is never that of a policy's server.
+            // The default port of the web is never the port of a policy's server.
             Some(_) if plain == "ws://" && url.starts_with(plain) && port_of(url).is_none() => {
                 Err(format!("{url:?} names no port; give {protocol}:{plain}HOST:PORT"))
             }
@@ -142,7 +142,7 @@ fn port_of(url: &str) -> Option<u16> {
 }
 
 impl PolicyFlags {
-    /// Returns the prices that a language model's flags give; `None` for another policy.
+    /// Returns the prices that the flags of a language model give; `None` for other policies.
     pub fn prices(&self) -> Option<PolicyPrices> {
         match &self.policy {
             PolicyChoice::Agent(flags) => Some(PolicyPrices::new(flags.prices(), &self.robot_models)),
@@ -214,7 +214,7 @@ impl PolicyFlags {
     }
 }
 
-/// Creates the policy of a language model, or of several.
+/// Creates the policy of one language model, or of several.
 fn agent(
     flags: &AgentFlags,
     robots: &RobotModels,
@@ -231,7 +231,7 @@ fn agent(
     Ok(Program::agent(&agent, name, card, driving, Duration::from_secs(limit_s.into()))?)
 }
 
-/// Creates the policy at `urls` with the map that `flag` gives, or else the protocol's default.
+/// Creates the policy at `urls` with the map that `flag` gives, or else with the protocol's default map.
 fn remote_policy(
     protocol: PolicyProtocol,
     urls: Vec<String>,
@@ -297,7 +297,7 @@ impl Policy for BuiltIn {
     }
 }
 
-/// A policy under another name.
+/// A policy with a different name.
 #[derive(Debug)]
 struct Renamed {
     name: String,

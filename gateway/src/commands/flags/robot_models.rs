@@ -1,4 +1,4 @@
-//! Language models of single robots, in place of the model of all.
+//! Language models of single robots, in place of the common model.
 
 use serde_json::{Map, Value};
 use tandem_tools_spec::Usage;
@@ -9,13 +9,13 @@ use super::agent::{AgentFlags, AgentPrices};
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct RobotModels {
     /// With --per-robot: model of one robot with its own flags, for example
-    /// "B=claude-opus-5-5?api=anthropic&max-usd=2". It shares only limits with the model of the others, unless
-    /// it has its own. Can be repeated.
+    /// "B=claude-opus-5-5?api=anthropic&max-usd=2". It shares only limits with the model of the others,
+    /// unless it has its own. Can be repeated.
     #[arg(long = "robot-model", value_name = "ROBOT=MODEL", requires = "per_robot", value_parser = parse_model)]
     models: Vec<RobotModel>,
 }
 
-/// The model of one robot.
+/// Model of one robot.
 #[derive(Debug, Clone)]
 struct RobotModel {
     robot: String,
@@ -35,7 +35,7 @@ fn parse_model(text: &str) -> Result<RobotModel, String> {
 }
 
 impl RobotModels {
-    /// Returns true if no robot has a model of its own.
+    /// Returns true if no robot has a separate model.
     pub fn is_empty(&self) -> bool {
         self.models.is_empty()
     }
@@ -81,8 +81,8 @@ impl PolicyPrices {
         self.common.are_given() && self.robots.iter().all(|(_, prices)| prices.are_given())
     }
 
-    /// Returns the price of a usage. `None` without prices, or if models differ and the usage does not say
-    /// what each robot's used.
+    /// Returns the price of a usage. `None` without prices, or if robots have separate models and the usage
+    /// has no token counts per robot.
     pub fn usd(&self, usage: &Usage) -> Option<f64> {
         if self.robots.is_empty() {
             return self.common.usd([usage.input_tokens, usage.cached_tokens, usage.output_tokens]);

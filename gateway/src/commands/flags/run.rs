@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, default_folder};
 
-/// Folder of the folders of runs.
+/// Parent folder of the folders of runs.
 const RUNS: &str = "runs";
 
 /// The folder of a run.
@@ -34,7 +34,7 @@ impl RunFlags {
         }
     }
 
-    /// Returns the folder for `plan`. Its default name is that of the policy, or `name`.
+    /// Returns the folder for `plan`. Its default name contains `name`, or else the name of the policy.
     pub fn folder(&self, plan: &EvaluationPlan, name: Option<&str>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| default_folder(plan, name, Path::new(RUNS)))
     }

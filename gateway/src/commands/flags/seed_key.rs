@@ -1,5 +1,5 @@
-//! An evaluator's key for drawing the meaning of seeds. Without the key, no one can simulate an episode
-//! in advance.
+//! An evaluator's secret key that determines the meaning of seeds. Without the key, no one can simulate an
+//! episode in advance.
 
 use std::{error::Error, fs, path::Path};
 

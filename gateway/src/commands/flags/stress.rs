@@ -28,7 +28,7 @@ impl StressFlags {
     }
 }
 
-/// Stress of evaluations that are played in addition to the plain one.
+/// Stress of evaluations that are played in addition to the evaluation without stress.
 #[derive(Debug, Args)]
 pub struct StressPlanFlags {
     /// Also play under stress: a comma-separated list of camera, light, texture, layout, mass, friction,
@@ -41,12 +41,12 @@ pub struct StressPlanFlags {
     level: Option<Levels>,
 }
 
-/// Axes on the command line. The type's name keeps clap from taking it for a flag that can be given
-/// several times.
+/// Axes given on the command line. The separate type keeps clap from treating them as a flag that can be
+/// given several times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Axes(Vec<StressAxis>);
 
-/// Levels on the command line. The type's name has the same reason.
+/// Levels given on the command line. The type is separate for the same reason as [`Axes`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Levels(Vec<StressLevel>);
 

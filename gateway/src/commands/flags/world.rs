@@ -56,12 +56,12 @@ impl WorldFlags {
         self.task_file.iter().flatten().map(|path| read_task_file(path)).collect()
     }
 
-    /// Returns the controller that the flag names; its file is not read yet.
+    /// Returns the controller that the flag names. Its file is not read yet.
     pub fn controller(&self) -> Controller {
         self.locomotion.controller()
     }
 
-    /// Returns the robots' sensing of their own state.
+    /// Returns the source and the sensor model of the robots' state.
     pub fn sensing(&self) -> Sensing {
         self.sensing.sensing()
     }
@@ -102,7 +102,7 @@ pub struct LocomotionFlag {
 }
 
 impl LocomotionFlag {
-    /// Returns the controller that the flag names; its file is not read yet.
+    /// Returns the controller that the flag names. Its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
     }

@@ -1,4 +1,4 @@
-//! `tandem policy-map`: maps between robots and learned policies, without a policy.
+//! `tandem policy-map`: maps between robots and learned policies, which are tried without a policy.
 
 use std::process::ExitCode;
 

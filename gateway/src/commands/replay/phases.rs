@@ -5,7 +5,7 @@ use std::fmt::Write;
 use tandem_episodes::Recording;
 use tandem_episodes::replay::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
 
-/// Describes the conditions of the next phase, each part by its place in the task's file.
+/// Describes the conditions of the next phase. Each part is named by its position in the task's file.
 pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>> {
     let Some(trace) = PhaseTrace::of(recording)? else { return Ok("  all phases were reached\n".into()) };
     let PhaseTrace { number, id, from_s, to_s, nearest, description, conditions } = trace;
@@ -25,8 +25,8 @@ pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>>
     Ok(told)
 }
 
-/// Returns a row for each part of a condition, and one for all of them at once: place, setting, time
-/// during which it held, text.
+/// Returns a row for each part of a condition, and one for all parts at once. A row has the position, the
+/// setting, the time during which the part held, and its text.
 fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
     let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
     let part = |(index, part): (usize, &PartTrace)| {
@@ -49,7 +49,7 @@ fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
     rows
 }
 
-/// Describes the longest uninterrupted time, if the condition has to hold for some time.
+/// Describes the longest uninterrupted time, if the condition has to hold for a certain time.
 fn without_break(held: &Held, for_s: f64) -> String {
     match for_s > 0.0 {
         true => format!("; without a break {:.2} s of {for_s}", held.longest_s()),

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-/// Maximum number of bytes that are kept of each of a program's two outputs.
+/// Maximum number of bytes that are kept of each of a program's two output streams.
 pub const MAX_OUTPUT_BYTES: u64 = 64 << 20;
 
 /// Marker at the end of an output that was cut.
@@ -34,9 +34,9 @@ impl KeptOutput {
         Ok(KeptOutput(ended))
     }
 
-    /// Waits until all of it is written, for at most `LAST_WORDS_WAIT`.
+    /// Waits until all output is written, for at most `LAST_WORDS_WAIT`.
     pub fn finish(self) {
-        // The other end sends no data; it is dropped at the end.
+        // The sender sends no data. It is dropped when all output is written.
         let _ = self.0.recv_timeout(LAST_WORDS_WAIT);
     }
 }
@@ -71,7 +71,7 @@ mod tests {
         assert!(kept("more words", 4).starts_with("more\n... (cut here"));
     }
 
-    /// All output is read although none can be written.
+    /// All output is read although none of it can be written.
     #[test]
     fn a_full_disk_lets_the_program_go_on() {
         struct Full;

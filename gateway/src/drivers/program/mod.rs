@@ -67,7 +67,7 @@ pub struct Program {
 
 impl Program {
     /// Creates a policy that runs `command` in a shell. A signal that ends this process also ends the
-    /// program's processes.
+    /// processes of the policy.
     pub fn new(command: String, driving: Driving, limit: Duration) -> Result<Program, SettingsError> {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
@@ -83,7 +83,7 @@ impl Program {
         Ok(Program { command, name, card, driving, limit, settings, processes })
     }
 
-    /// Creates a policy that is a language model called `name` in results, with this `card`.
+    /// Creates a policy that is a language model. Results contain its `name` and `card`.
     pub fn agent(
         agent: &PythonModule,
         name: String,
@@ -94,7 +94,7 @@ impl Program {
         Ok(Program { name, card, ..Program::new(agent.shell_line(), driving, limit)? })
     }
 
-    /// Returns the settings of a server for this episode alone.
+    /// Returns the settings of a server that hosts only this episode.
     fn settings_for(&self, spec: &EpisodeSpec, token: Token) -> Result<Arc<Settings>, PlayError> {
         Ok(Arc::new(Settings {
             token: Some(token),
@@ -112,7 +112,7 @@ impl Program {
         }))
     }
 
-    /// Starts a process for each participant and waits until all have ended. Returns the exit of each.
+    /// Starts a process for each participant, waits until all have ended, and returns the exit of each.
     fn run(
         &self,
         server: &Server,
@@ -143,8 +143,8 @@ impl Program {
         Ok(found.collect())
     }
 
-    /// Waits until all programs have ended, one of them has failed, or their time is over. Returns the
-    /// exit of each with its control step.
+    /// Waits until all programs have ended, one of them has failed, or their time limit is over. Returns the
+    /// exit of each program with its control step.
     fn watch(
         &self,
         groups: &mut [ProcessGroup],
@@ -158,7 +158,7 @@ impl Program {
                 if exit.is_none()
                     && let Some(well) = group.ended_well()?
                 {
-                    // If a program has ended and the episode still runs, the program ended first.
+                    // If a program has ended while the episode still runs, the program ended first.
                     let found = match (episode.ended(), well) {
                         (true, _) => ProgramExit::After,
                         (false, true) => ProgramExit::Left,
@@ -179,8 +179,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // A program that exited normally had done its part if the others completed the episode, or if
-                // another program caused its end.
+                // A program that exited normally had done its part if the other programs completed the
+                // episode, or if another program caused its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),
@@ -244,7 +244,7 @@ impl Program {
         if result.tool_calls == 0 {
             return Err(PlayError::NotReady(stopped.unwrap_or_else(|| "the program made no call".into())));
         }
-        // A hanging program counts as a failed one.
+        // A hanging program counts as failed.
         let ended = match result.ended {
             EndReason::Abandoned => EndReason::PolicyFailed,
             ended => ended,
@@ -321,11 +321,11 @@ fn told_ending(ended: &ModelEnding) -> String {
 /// State of a program at the end of the wait.
 struct FoundProgram {
     exit: ProgramExit,
-    /// Control steps of the episode at that time.
+    /// Number of control steps of the episode at that time.
     env_steps: u32,
     /// Exit status as text.
     status: String,
-    /// Reason of the program's last refusal, if it has failed.
+    /// Reason for the program's last refusal, if the program has failed.
     refusal: Option<String>,
 }
 
@@ -353,11 +353,11 @@ impl ProgramExit {
     }
 }
 
-/// Returns as many of the last lines as fit that a program has written to stderr, or else to stdout.
+/// Returns the last lines that a program has written to stderr, or else to stdout, as many as fit.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
         let path = folder.join(name);
-        // A program may have put a link in its place.
+        // A program may have replaced the file by a link.
         fs::symlink_metadata(&path).ok().filter(|found| found.is_file())?;
         let mut file = File::open(path).ok()?;
         let read_from = file.metadata().ok()?.len().saturating_sub(LAST_WORDS_BYTES);
@@ -366,7 +366,7 @@ fn last_lines(folder: &Path) -> Option<String> {
         // The program may still be writing.
         file.take(LAST_WORDS_BYTES).read_to_end(&mut bytes).ok()?;
         let text = String::from_utf8_lossy(&bytes);
-        // Python underlines errors with lines without words.
+        // Python underlines errors with lines that contain no letters.
         let worded = text.lines().map(str::trim).filter(|line| line.contains(char::is_alphanumeric));
         let mut lines = worded.rev();
         let mut quoted: String = lines.next()?.chars().take(QUOTED_CHARS).collect();

@@ -21,17 +21,17 @@ const CONVERSATION_FILE: &str = "agent.jsonl";
 /// A program that controls all robots, or one robot.
 #[derive(Debug)]
 pub struct Participant<'a> {
-    /// The robot that it controls; `None` if it controls all.
+    /// Robot that the program controls; `None` if it controls all robots.
     pub robot: Option<&'a str>,
     token: &'a str,
-    /// Folder of its brief and its output while it runs. The name is neutral, and the folders of other
+    /// Folder of the program's brief and output while it runs. The name is neutral, and the folders of other
     /// programs and episodes are elsewhere.
     pub folder: TempDir,
 }
 
 impl<'a> Participant<'a> {
-    /// Creates the programs of the episode `start`: one with the server's own `token`, or one for each
-    /// operator.
+    /// Creates the programs of the episode `start`: one program with the server's own `token`, or one for
+    /// each operator.
     pub fn all(start: &'a StartReply, token: &'a str) -> Result<Vec<Participant<'a>>, PlayError> {
         let participant = |robot: Option<&'a str>, token: &'a str| {
             let folder = private_folder().map_err(|error| lost("no folder for a program", error))?;
@@ -86,7 +86,7 @@ impl<'a> Participant<'a> {
     }
 }
 
-/// Creates a folder that no other user may enter. It is removed when it is dropped.
+/// Creates a folder that no other user may enter. Dropping it removes it.
 fn private_folder() -> io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("tandem-");
@@ -98,7 +98,7 @@ fn private_folder() -> io::Result<TempDir> {
 /// Hosts that are reached without a proxy.
 const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "::1"];
 
-/// Returns variables that exclude this machine from proxies, in addition to existing exceptions.
+/// Returns variables that exempt this machine from proxies, in addition to existing exceptions.
 fn off_proxies() -> [(&'static str, String); 2] {
     ["NO_PROXY", "no_proxy"].map(|name| {
         let known = env::var(name).unwrap_or_default();
@@ -155,7 +155,7 @@ fn addressee(start: &StartReply, robot: Option<&str>) -> String {
     )
 }
 
-/// Describes how programs that control one robot each act together.
+/// Describes how programs that each control one robot act together.
 fn partners(driving: &Driving) -> String {
     let talk = match driving.talk {
         Some(true) => " You may talk to the others with the tool say; what they say comes with your replies.",

@@ -19,7 +19,7 @@ pub const BRIEF_FILE: &str = "brief.txt";
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 
-/// Time that a process group has to end after the request to terminate.
+/// Time that a process group has to end after it is asked to terminate.
 const TERMINATION_GRACE: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -37,7 +37,7 @@ impl ProcessGroups {
 /// A program with all its children. Dropping it stops them.
 pub struct ProcessGroup {
     child: Child,
-    /// Process that ends the group once this process is gone for any reason; `None` if it could not be
+    /// Process that ends the group once this process has ended for any reason; `None` if it could not be
     /// started.
     guard: Option<Child>,
     groups: Arc<ProcessGroups>,
@@ -47,8 +47,8 @@ pub struct ProcessGroup {
 }
 
 impl ProcessGroup {
-    /// Starts `command` in a shell, with the brief in `folder` on its standard input and its output kept
-    /// there.
+    /// Starts `command` in a shell. The brief in `folder` is its standard input, and its output is kept in
+    /// `folder`.
     pub fn start(
         groups: &Arc<ProcessGroups>,
         command: &str,
@@ -160,7 +160,7 @@ pub fn end_all_programs() {
 /// Releases the guard of a group that has ended.
 fn dismiss(mut guard: Child) {
     if let Some(mut stdin) = guard.stdin.take() {
-        // It may have been killed.
+        // The guard may have been killed.
         let _ = stdin.write_all(b"ended\n");
     }
     let _ = guard.wait();
@@ -176,7 +176,7 @@ mod system {
 
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
-    /// Creates the process of the shell that runs a command.
+    /// Prepares a shell process that runs a command.
     pub fn shell(command: &str) -> Command {
         let mut shell = Command::new("sh");
         shell.args(["-c", command]);
@@ -189,10 +189,10 @@ mod system {
     }
 
     /// Shell script that waits for a line and kills the group if its input ends without one. The kernel
-    /// closes the pipe of a process that is gone.
+    /// closes the pipe of a process that has ended.
     const GUARD: &str = r#"trap '' HUP INT TERM; read -r line || kill -s KILL -- "-$1""#;
 
-    /// Starts the guard, which ends the group once this process is gone.
+    /// Starts the guard, which ends the group once this process has ended.
     pub fn guard(id: u32) -> io::Result<Option<Child>> {
         let mut shell = shell(GUARD);
         shell.args(["tandem-guard", &id.to_string()]);
@@ -223,7 +223,7 @@ mod system {
 
     fn signal(id: u32, signal: Signal) {
         if let Some(pid) = number(id) {
-            // The call fails if no process of the group is left, which is fine.
+            // The call fails if the group has no process left, which is not an error here.
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -241,7 +241,7 @@ mod system {
         process::{Child, Command, Stdio},
     };
 
-    /// Creates the process of the shell that runs a command. It only removes the outer quotes.
+    /// Prepares a shell process that runs a command. The shell only removes the outer quotes.
     pub fn shell(command: &str) -> Command {
         let mut shell = Command::new("cmd");
         shell.args(["/S", "/C"]).raw_arg(format!("\"{command}\""));
@@ -258,7 +258,7 @@ mod system {
         Ok(child.try_wait()?.map(|status| status.success()))
     }
 
-    /// Kills the group, since a program without windows cannot be asked.
+    /// Kills the group, since a program without windows cannot be asked to end.
     pub fn terminate(id: u32) {
         kill_group(id);
     }
@@ -267,7 +267,7 @@ mod system {
         let _ = child.kill();
     }
 
-    /// Kills a process that runs, and all that it has started.
+    /// Kills a running process and all processes that it has started.
     pub fn kill_group(id: u32) {
         let mut kill = Command::new("taskkill");
         kill.args(["/T", "/F", "/PID", &id.to_string()]);

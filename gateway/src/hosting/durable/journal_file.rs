@@ -1,8 +1,7 @@
-//! The journal of an episode as a file: a heading line, then one line for each group of calls that were
-//! answered together.
+//! Journal file of an episode: a heading line, then one line for each group of calls that were answered
+//! together.
 //!
-//! A line is either written whole or ignored. So an action and its answer are never recorded one without
-//! the other.
+//! An incomplete line is ignored, so an action and its answer are either both recorded or both missing.
 
 use std::{
     error::Error,
@@ -26,25 +25,26 @@ use crate::{hosting::Answer, settings::Durability};
 /// Version of the format. Builds with different versions cannot read each other's lines.
 const FORMAT: u32 = 1;
 
-/// Initial buffer size; enough for most lines, which hold a robot's state and the request.
+/// Initial size of a line's buffer in bytes. It suffices for most lines, which hold a robot's state and the
+/// request.
 const USUAL_LINE_BYTES: usize = 8 << 10;
 
 /// Description of an episode and of its start.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Heading {
     format: u32,
-    /// Build that plays the episode.
+    /// Build of the server that began the episode.
     pub build: String,
     pub spec: EpisodeSpec,
     pub visibility: Visibility,
     pub driving: Driving,
-    /// Reply to the start, tokens included.
+    /// Reply to the start, including the tokens.
     pub start: StartReply,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub key: Option<StartKey>,
 }
 
-/// Idempotency key of a start and the arguments that came with it.
+/// Idempotency key of a start, and the arguments of the start.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StartKey {
     pub key: String,
@@ -58,7 +58,7 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// A line of a journal: requests that were answered together, their answers and notes that have a key,
+/// A line of a journal: requests that were answered together, the answers and notes with an idempotency key,
 /// and the host's memory if it has changed.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
@@ -72,7 +72,7 @@ pub struct Commit {
     pub memory: Option<Value>,
 }
 
-/// A note that came with a key and is kept once.
+/// A note with an idempotency key, under which it is recorded once.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct KeyedNote {
     pub key: String,
@@ -114,7 +114,7 @@ pub struct JournalFile {
 pub struct JournalReader {
     pub heading: Heading,
     lines: BufReader<File>,
-    /// Length of the whole lines read up to now.
+    /// Total length in bytes of the complete lines read so far.
     whole_bytes: u64,
 }
 
@@ -177,14 +177,14 @@ impl JournalFile {
         match journal.append(heading) {
             Ok(()) => Ok(journal),
             Err(error) => {
-                // Half a heading is useless.
+                // A journal with an incomplete heading is useless.
                 let _ = journal.remove();
                 Err(error)
             }
         }
     }
 
-    /// Continues a journal that has been read to its end.
+    /// Opens a journal that has been read to its end for appending.
     pub fn go_on(path: &Path, read: JournalReader, durability: Durability) -> io::Result<JournalFile> {
         let file = OpenOptions::new().append(true).open(path)?;
         file.set_len(read.whole_bytes)?;
@@ -203,7 +203,7 @@ impl JournalFile {
         }
     }
 
-    /// Removes the journal, so that the episode is not brought back.
+    /// Removes the journal, so that the episode cannot be restored.
     pub fn remove(self) -> io::Result<()> {
         fs::remove_file(&self.path)
     }
@@ -222,7 +222,7 @@ impl JournalReader {
         Ok(JournalReader { heading, lines, whole_bytes: bytes })
     }
 
-    /// Returns the next commit, or `None` after the last whole line.
+    /// Returns the next commit, or `None` after the last complete line.
     pub fn next_commit(&mut self) -> io::Result<Option<Commit>> {
         let read = read_line(&mut self.lines)?;
         Ok(read.map(|(commit, bytes)| {
@@ -241,8 +241,8 @@ fn private_file(path: &Path) -> io::Result<File> {
     options.open(path)
 }
 
-/// Reads a whole line and returns it with its length. Returns `None` at the end or for an incomplete
-/// line.
+/// Reads a complete line and returns it with its length in bytes. Returns `None` at the end or for an
+/// incomplete line.
 fn read_line<T: for<'a> Deserialize<'a>>(lines: &mut impl BufRead) -> io::Result<Option<(T, u64)>> {
     let mut line = Vec::new();
     lines.read_until(b'\n', &mut line)?;

@@ -1,4 +1,4 @@
-//! Leases, which decide which server plays an episode: the one that has locked the episode's lease file.
+//! Leases of episodes. The server that has locked an episode's lease file plays the episode.
 //!
 //! On a file system without locks, a lease is held for as long as its owner keeps renewing it.
 
@@ -14,17 +14,17 @@ use tandem_episodes::{FileLock, LockKind, Locking};
 
 use super::age;
 
-/// Age after which the owner of a lease counts as gone. Used without file locks only.
+/// Age after which the owner of a lease counts as gone. Used only on file systems without locks.
 const STALE: Duration = Duration::from_secs(30);
 
-/// Number of attempts to take a lease that is held. A server that only looks at it holds it for
+/// Number of attempts to take a lease that is held. A server that only checks the lease holds it for
 /// microseconds.
 const ATTEMPTS: u32 = 40;
 const ATTEMPT_INTERVAL: Duration = Duration::from_millis(1);
-/// Remaining attempts from which a lease with a readable owner counts as held.
+/// Remaining attempts at or below which a lease with a readable owner counts as held.
 const SURE_AFTER: u32 = ATTEMPTS - 3;
 
-/// The right to play an episode, held until it is dropped.
+/// The right to play an episode, released when the value is dropped.
 #[derive(Debug)]
 pub struct Lease {
     path: PathBuf,
@@ -38,7 +38,7 @@ pub enum Leasing {
     Taken(Lease),
     /// Another server, reachable at `url`, holds the lease.
     Held {
-        /// URL that the owner has published; empty if it has not written it yet.
+        /// URL of the owner; empty if the owner has not written it yet.
         url: String,
     },
 }
@@ -91,11 +91,11 @@ impl Lease {
         }
     }
 
-    /// Shows that the owner is still alive. It must be called more often than every [`STALE`].
+    /// Renews a lease without locks. The owner must call it at intervals shorter than [`STALE`].
     pub fn renew(&self) {
         if self.lock.is_none() {
             let touched = File::options().write(true).open(&self.path);
-            // A failure matters only once the lease is stale.
+            // A failure has no effect until the lease is stale.
             let _ = touched.and_then(|file| file.set_modified(SystemTime::now()));
         }
     }
@@ -116,7 +116,7 @@ fn fresh_owner(path: &Path) -> Option<String> {
 
 fn owner(path: &Path) -> String {
     let mut text = String::new();
-    // The owner of a new file may not have been written yet.
+    // The owner may not have been written to a new file yet.
     let _ = File::open(path).and_then(|file| file.take(2048).read_to_string(&mut text));
     text.trim().into()
 }

@@ -1,7 +1,7 @@
-//! Episodes that outlive the process which holds them.
+//! Journals and leases of episodes that outlive the server process.
 //!
-//! Each has a journal beside the runs, to which every call is written before its answer is sent. Each
-//! also has a lease that names the server which plays it. The server that takes the lease replays the
+//! Each episode has a journal in the runs folder, to which every call is written before its answer is sent.
+//! Each also has a lease that names the server that plays it. A server that takes over the lease replays the
 //! journal.
 
 mod journal_file;
@@ -20,7 +20,7 @@ use tandem_episodes::create_private_folder;
 
 use crate::settings::Durability;
 
-/// Folder of journals in the runs folder. A name that begins with a dot is never a run.
+/// Folder of journals in the runs folder. No run has a name that begins with a dot.
 const LIVE_FOLDER: &str = ".live";
 const JOURNAL_EXTENSION: &str = "jsonl";
 
@@ -34,7 +34,7 @@ pub struct LiveFolder {
 }
 
 impl LiveFolder {
-    /// Describes the journals beside `runs` for a server that is reachable at `url`.
+    /// Describes the journals in the runs folder `runs` for a server that is reachable at `url`.
     pub fn beside(runs: &Path, url: String, durability: Durability) -> LiveFolder {
         LiveFolder { path: runs.join(LIVE_FOLDER), url, durability }
     }

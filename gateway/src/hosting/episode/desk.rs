@@ -1,5 +1,5 @@
-//! Jobs on the thread of an episode, which owns its session. Each is written to the episode's journal before
-//! it is answered.
+//! Jobs on the thread of an episode, which owns the session. The effects of a job are written to the
+//! episode's journal before its answer is sent.
 
 use std::{
     sync::{Arc, atomic::Ordering::Relaxed},
@@ -17,17 +17,17 @@ use crate::hosting::{
     durable::{Commit, Heading, JournalFile, KeptAnswer, Keyed, KeyedNote, Lease, Leasing},
 };
 
-/// A unit of work on an episode. No other job runs while it does. It gets the reason if the episode is not
+/// A unit of work on an episode. Jobs run one after another. The argument is an error if the episode is not
 /// available.
 pub type Job = Box<dyn FnOnce(Result<&mut Desk, HostingError>) + Send>;
 
 /// Outcome of a job.
 pub type Outcome<T> = Result<T, HostingError>;
 
-/// Sender of an episode's result to the caller that has asked for its end.
+/// Sender of an episode's result to the caller that requested the end.
 pub type ResultSender = oneshot::Sender<Outcome<ResultReply>>;
 
-/// A session and the journal to which it is written.
+/// A session and the journal to which its calls are written.
 pub struct Desk {
     stage: Arc<Stage>,
     session: PanicGuard,
@@ -41,31 +41,31 @@ pub struct Desk {
 pub struct Log {
     pub file: JournalFile,
     pub lease: Lease,
-    /// Memory that was written last.
+    /// Host memory as last written to the journal.
     pub memory: Value,
 }
 
 /// A request to close the episode.
 pub struct Closing {
-    /// True if the next server is to bring the episode back.
+    /// True to keep the journal, so that the next server can restore the episode.
     pub keep: bool,
     pub reply: ResultSender,
 }
 
 /// Reason why the thread ended.
 pub enum Left {
-    /// The caller that asked for the end, and the result it receives once the place is free.
+    /// Sender to the caller that requested the end, and the result to send once the permit is released.
     Closed(Option<(ResultSender, Box<Outcome<ResultReply>>)>),
     Asleep,
 }
 
 impl Desk {
-    /// Begins to work on `session`, which is written to the journal `log`.
+    /// Creates the desk for `session`, whose calls are written to the journal `log`.
     pub fn new(stage: Arc<Stage>, session: PanicGuard, log: Option<Log>) -> Desk {
         Desk { stage, session, log, sleeps: false, closing: None }
     }
 
-    /// Does jobs until one asks for the end or for sleep, or until all senders are gone.
+    /// Runs jobs until one closes or suspends the episode, or until all senders are dropped.
     pub fn work(mut self, mut inbox: mpsc::Receiver<Job>) -> Left {
         self.stage.status.update(&self.session);
         while let Some(job) = inbox.blocking_recv() {
@@ -74,7 +74,7 @@ impl Desk {
                 return Left::Closed(Some((reply, Box::new(self.close(keep)))));
             }
             if self.sleeps {
-                // Jobs that have arrived by now are still done; later ones wake the episode up.
+                // Jobs that are already queued still run; later jobs resume the episode.
                 inbox.close();
             }
         }
@@ -82,7 +82,7 @@ impl Desk {
             self.stage.memory.let_go();
             return Left::Asleep;
         }
-        // Nobody is left to receive the result.
+        // No sender is left, so nobody receives the result.
         let _ = self.close(true);
         Left::Closed(None)
     }
@@ -99,7 +99,7 @@ impl Desk {
         done
     }
 
-    /// Suspends the episode after the jobs that are in the queue now, if it can be brought back.
+    /// Suspends the episode after the jobs that are queued now, if it can be resumed.
     pub fn sleep(&mut self) -> Outcome<()> {
         if self.log.is_some() {
             let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
@@ -114,7 +114,7 @@ impl Desk {
         self.closing = Some(closing);
     }
 
-    /// Ends the episode if its policy's clock has run out, or if it has made no call for `idle`.
+    /// Ends the episode if its policy has used up its thinking time, or has made no call for `idle`.
     pub fn end_if_abandoned(&mut self, idle: Duration) -> Outcome<()> {
         let goes_on = self.session.ended().is_none();
         self.run(|session| {
@@ -127,7 +127,7 @@ impl Desk {
         Ok(())
     }
 
-    /// Records a note, which came with `key`.
+    /// Records a note. `key` is its idempotency key, if it has one.
     pub fn note(&mut self, operator: Option<&str>, note: Note, key: Option<String>) -> Outcome<()> {
         let keyed = key.map(|key| KeyedNote { key, note: note.clone() });
         let kept = self.on_session(|session| Ok(session.note(operator, note)?));
@@ -140,7 +140,7 @@ impl Desk {
         self.commit_noted(answers, None);
     }
 
-    /// Does the same as [`Desk::commit`], with a recorded note that came with a key.
+    /// Does the same as [`Desk::commit`], and writes a recorded note that has a key.
     fn commit_noted<'a>(
         &mut self,
         answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>,
@@ -173,7 +173,7 @@ impl Desk {
         }
     }
 
-    /// Starts the journal from which the episode can be brought back.
+    /// Begins the journal from which the episode can be restored.
     pub fn begin_journal(&mut self, heading: &Heading) -> Outcome<()> {
         let Some(journals) = &self.stage.journals else { return Ok(()) };
         let Some(path) = journals.journal(&self.stage.id) else { return Ok(()) };
@@ -188,7 +188,7 @@ impl Desk {
         });
         match begun {
             Ok(log) => {
-                // After a panic there is no state to keep.
+                // The error after a panic is ignored, because there is no state to keep.
                 let _ = self.session.run(Session::keep_journal);
                 self.log = Some(log);
                 self.stage.status.durable.store(true, Relaxed);

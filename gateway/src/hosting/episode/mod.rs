@@ -1,7 +1,7 @@
 //! The thread that owns the world of one episode.
 //!
-//! Calls reach it through a bounded channel, each with its own reply. A call whose caller has gone still
-//! finishes, is recorded and charged.
+//! Calls reach the thread through a bounded channel, each with a reply channel. A call whose caller has
+//! disconnected is still completed, recorded and charged.
 
 mod desk;
 mod onlookers;
@@ -42,15 +42,15 @@ pub use stage::{HostMemory, Surroundings};
 use status::SharedStatus;
 use work::Opening;
 
-/// An episode. Its thread ends while the episode sleeps, and any request wakes it up. Dropping the last
-/// handle closes its recording.
+/// Handle of an episode. A suspended episode has no thread, and any request resumes it. Dropping the last
+/// handle closes the recording.
 #[derive(Debug)]
 pub struct EpisodeThread {
     queue: JobQueue,
     stage: Arc<Stage>,
     robots: Vec<String>,
     steps_per_command: u32,
-    /// Limits the watchers that are joining at once, so that they do not use up the places for calls.
+    /// Limits the number of watchers that join at the same time, so that they do not fill the queue of calls.
     looking: Semaphore,
 }
 
@@ -80,7 +80,7 @@ impl EpisodeThread {
         Ok((EpisodeThread::on(stage, jobs, &briefing), briefing))
     }
 
-    /// Creates an episode that sleeps after the given `entries` of its journal and began with `briefing`.
+    /// Creates a suspended episode whose journal contains `entries` and whose start returned `briefing`.
     pub fn asleep<'a>(
         id: &str,
         spec: EpisodeSpec,
@@ -90,7 +90,7 @@ impl EpisodeThread {
     ) -> EpisodeThread {
         let status = SharedStatus::asleep(entries, briefing.status.env_steps);
         let stage = Arc::new(Stage::new(id, spec, surroundings, status));
-        // The channel has no receiver, so the first job wakes the episode up.
+        // The channel has no receiver, so the first job resumes the episode.
         EpisodeThread::on(stage, mpsc::channel(1).0, briefing)
     }
 
@@ -104,21 +104,21 @@ impl EpisodeThread {
         }
     }
 
-    /// Starts to write a journal from which a later process can bring the episode back.
+    /// Begins to write a journal from which a later process can restore the episode.
     pub async fn begin_journal(&self, heading: Heading) -> Result<(), HostingError> {
         self.queue.work(move |desk| desk.begin_journal(&heading)).await
     }
 
-    /// Wakes the episode up if necessary and returns once it is there.
+    /// Resumes the episode if it is suspended, and returns once its state is restored.
     pub async fn awake(&self) -> Result<(), HostingError> {
-        // Being woken up is not enough: the answers of the journal have to be restored first.
+        // A running thread is not enough: the answers in the journal have to be restored first.
         match self.stage.status.is_there() {
             true => Ok(()),
             false => self.queue.work(|_| Ok(())).await,
         }
     }
 
-    /// Suspends the episode if it can be brought back and nobody would notice.
+    /// Suspends the episode if it can be resumed and nobody is affected.
     pub fn put_aside(&self) {
         if self.may_sleep() {
             self.queue.send_if_idle(job(Desk::sleep).0);
@@ -134,7 +134,7 @@ impl EpisodeThread {
             && !memory.is_busy()
     }
 
-    /// Returns true if the episode sleeps.
+    /// Returns true if the episode is suspended.
     pub fn sleeps(&self) -> bool {
         self.stage.status.sleep().is_some()
     }
@@ -151,8 +151,7 @@ impl EpisodeThread {
 
     /// Runs a call with all its options, also for the operator of a single robot.
     ///
-    /// `then` converts the answer before it is sent. The converted answer is the one kept for a call with
-    /// a key.
+    /// `then` converts the answer before it is sent. For a call with a key, the converted answer is kept.
     pub async fn ask(
         &self,
         operator: Option<&str>,
@@ -175,7 +174,7 @@ impl EpisodeThread {
         answer.inspect_err(|error| self.stage.status.refuse(error.to_string()))
     }
 
-    /// Keeps an answer that was combined from several for repeated requests.
+    /// Keeps an answer that was combined from several answers, for repeated requests.
     pub async fn keep_answer(&self, keyed: Keyed, answer: Answer) -> Result<Answer, HostingError> {
         self.queue
             .work(move |desk| {
@@ -185,13 +184,13 @@ impl EpisodeThread {
             .await
     }
 
-    /// Parses an operator's command. Refuses commands that cannot be executed or whose observation could
-    /// not be rendered.
+    /// Parses an operator's command. Returns an error if the command cannot be executed or its observation
+    /// cannot be rendered.
     pub async fn read_command(&self, call: OperatorCall) -> Result<OperatorCommand, HostingError> {
         self.queue.work_unless_full(|desk| desk.run(|session| Ok(session.read_command(call)?))).await
     }
 
-    /// Executes commands of several operators side by side. Returns one answer for each, with the
+    /// Executes commands of several operators simultaneously. Returns one answer per command, with the
     /// requested observation, converted by `then`.
     pub async fn together(
         &self,
@@ -199,7 +198,7 @@ impl EpisodeThread {
         then: impl FnOnce(Vec<Answer>) -> Vec<Answer> + Send + 'static,
     ) -> Result<Vec<Answer>, HostingError> {
         let (commands, keyed): (Vec<_>, Vec<_>) = commands.into_iter().unzip();
-        // Callers are waiting for it already, so it queues up.
+        // Callers are waiting for this step already, so it is queued even if the queue is full.
         self.queue
             .work(move |desk| {
                 let answers = desk.on_session(|session| {
@@ -215,7 +214,7 @@ impl EpisodeThread {
             .await
     }
 
-    /// Records a note of the policy that controls all robots, or of the operator of one.
+    /// Records a note of the policy that controls all robots, or of the operator of one robot.
     pub async fn note(
         &self,
         operator: Option<&str>,
@@ -226,8 +225,8 @@ impl EpisodeThread {
         self.queue.work_unless_full(move |desk| desk.note(operator.as_deref(), note, key)).await
     }
 
-    /// Records a call that was refused before it reached the episode, after its caller's earlier calls. A
-    /// failure is ignored.
+    /// Records a call that was refused before it reached the episode. It is recorded after the caller's
+    /// earlier calls, and failures are ignored.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, RefusedCall { tool, arguments, problem }) = (operator.map(str::to_owned), call);
         self.stage.status.refuse(problem.clone());
@@ -238,7 +237,7 @@ impl EpisodeThread {
         let _ = recorded.await;
     }
 
-    /// Returns the state of the episode for watchers; it does not count as a call of the policy.
+    /// Returns the state of the episode for watchers. The request does not count as a call of the policy.
     pub async fn status(&self) -> Result<Answer, HostingError> {
         self.queue
             .work_unless_full(|desk| {
@@ -255,20 +254,20 @@ impl EpisodeThread {
         self.queue.work_unless_full(|desk| desk.on_session(|session| Ok(session.briefing()))).await
     }
 
-    /// Returns the current state and a stream of the events from now on, for a watcher. It does not count
-    /// as a call of the policy.
+    /// Returns the current state and a stream of the events from now on, for a watcher. The request does not
+    /// count as a call of the policy.
     pub async fn watch(&self) -> Result<LiveWatch, HostingError> {
         self.watch_as(None).await
     }
 
-    /// Does the same as [`EpisodeThread::watch`] for the person who drives `robot` and receives every
-    /// step. That person sees privileged information, which is recorded and named in results.
+    /// Does the same as [`EpisodeThread::watch`] for the person who drives `robot` and receives every step.
+    /// The recording and the results name the privileged information that this person sees.
     pub async fn watch_driving(&self, robot: &str) -> Result<(LiveWatch, EveryStep), HostingError> {
         Ok((self.watch_as(Some(robot.into())).await?, self.stage.feed.every_step()))
     }
 
     async fn watch_as(&self, operator: Option<String>) -> Result<LiveWatch, HostingError> {
-        // Subscribing comes first, so that no event is missed in between.
+        // The subscription comes before the view, so that no event between them is missed.
         let events = self.stage.feed.subscribe().ok_or(HostingError::EpisodeStopped)?;
         let _turn = self.looking.acquire().await.map_err(|_| HostingError::EpisodeStopped)?;
         let view = self.queue.run(move |session| match operator {
@@ -279,13 +278,13 @@ impl EpisodeThread {
         Ok(LiveWatch { view, events })
     }
 
-    /// Returns all poses and contacts, for experts and scoring in this process and never for policies.
+    /// Returns all poses and contacts. They are for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         self.queue.run_blocking(|session| Ok(session.facts()))
     }
 
-    /// Returns the robots' uncompressed images for a policy that is queried from this process. `shown`
-    /// names the extra information that policies usually do not get; results name it.
+    /// Returns the robots' uncompressed images for a policy that this process queries. `shown` is the
+    /// additional information that the benchmark withholds from policies; results name it.
     pub fn look_blocking(
         &self,
         observe: &Observe,
@@ -295,32 +294,32 @@ impl EpisodeThread {
         self.queue.run_blocking(move |session| Ok(session.observe(&observe, &shown)?))
     }
 
-    /// Returns the image of the third-person camera for the same policies.
+    /// Returns the image of the third-person camera, for a policy that this process queries.
     pub fn room_blocking(&self) -> Result<Picture, HostingError> {
         self.queue.run_blocking(|session| Ok(session.third_person()))
     }
 
-    /// Ends the episode if its policy's clock has run out, or if it has made no call for `idle`.
+    /// Ends the episode if its policy has used up its thinking time, or has made no call for `idle`.
     pub fn end_if_abandoned(&self, idle: Duration) {
         let job = job(move |desk| desk.end_if_abandoned(idle)).0;
         match self.stage.status.sleep() {
             Some(sleep) if sleep.thinking() < idle => {}
-            // An episode that has stopped meanwhile has ended.
+            // The error of an episode that has stopped meanwhile is ignored.
             Some(_) => drop(self.queue.send(job)),
-            // If calls are waiting, the caller is still there, and the places in the queue are for calls.
+            // If calls are waiting, the episode is not abandoned, so the job is not queued.
             None => self.queue.send_if_idle(job),
         }
     }
 
-    /// Ends the episode for an external reason after the calls already waiting, unless it has ended by
-    /// then.
+    /// Ends the episode for an external reason, after the calls already waiting. Has no effect if the episode
+    /// has ended by then.
     pub fn end(&self, reason: EndReason) -> Result<(), HostingError> {
         self.queue.send(end(reason))
     }
 
-    /// Does the same as [`EpisodeThread::end`], however many calls wait.
+    /// Does the same as [`EpisodeThread::end`], however many calls are waiting.
     ///
-    /// It blocks while the queue is full, so it must not be called from async code.
+    /// The method blocks while the queue is full, so it must not be called from async code.
     pub fn end_blocking(&self, reason: EndReason) {
         self.queue.send_blocking(end(reason));
     }
@@ -330,7 +329,8 @@ impl EpisodeThread {
         self.close_for(false).await
     }
 
-    /// Does the same as [`EpisodeThread::close`] for an episode that will be brought back.
+    /// Does the same as [`EpisodeThread::close`], but keeps the journal, so that the episode can be resumed
+    /// later.
     pub async fn leave(&self) -> Result<ResultReply, HostingError> {
         self.close_for(true).await
     }
@@ -358,7 +358,7 @@ impl EpisodeThread {
         self.end_reason().is_some() || (!self.sleeps() && self.queue.is_closed())
     }
 
-    /// Returns the reason why the episode has ended, as known after its last call.
+    /// Returns the reason why the episode has ended, as of its last call; `None` before it ends.
     pub fn end_reason(&self) -> Option<EndReason> {
         self.stage.status.ended.get().copied()
     }
@@ -368,7 +368,7 @@ impl EpisodeThread {
         self.stage.status.env_steps()
     }
 
-    /// Returns the reason of the last refusal of a call.
+    /// Returns the reason why the last refused call was refused.
     pub fn last_refusal(&self) -> Option<String> {
         self.stage.status.last_refusal()
     }
@@ -408,12 +408,13 @@ impl EpisodeThread {
         &self.stage.folder.path
     }
 
-    /// Begins a plan of the operator `own`, which is refused if one of its commands could not be carried out.
+    /// Begins the plan that came with the operator's call `own`. Returns an error if one of the plan's
+    /// commands cannot be executed.
     pub async fn begin_plan(&self, own: OperatorCall, plan: PlanCall) -> Result<PlanRun, HostingError> {
         self.queue.run(move |session| Ok(session.begin_plan(&own, &plan)?)).await
     }
 
-    /// Returns the plan with its next command.
+    /// Advances the plan, and returns it with its next command or its end.
     pub async fn advance_plan(&self, mut run: PlanRun) -> Result<(PlanRun, PlanAdvance), HostingError> {
         self.queue
             .run(move |session| {
@@ -423,7 +424,7 @@ impl EpisodeThread {
             .await
     }
 
-    /// Returns the reply to an operator's plan that goes no further, and the step that the episode is at.
+    /// Returns the reply to an operator's plan that has ended, and the episode's current control step.
     pub async fn end_plan(
         &self,
         call: Call,
@@ -434,7 +435,7 @@ impl EpisodeThread {
     }
 }
 
-/// Makes a job that ends the episode.
+/// Creates a job that ends the episode.
 fn end(reason: EndReason) -> Job {
     let end = move |desk: &mut Desk| {
         desk.run(|session| {

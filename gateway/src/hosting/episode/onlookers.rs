@@ -1,5 +1,5 @@
-//! Watchers of one episode. Its thread publishes events without waiting; a watcher that is too slow
-//! misses the oldest ones.
+//! Watchers of one episode. The episode's thread publishes events without waiting, so a slow watcher misses
+//! the oldest events.
 
 use std::{
     cell::Cell,
@@ -13,16 +13,16 @@ use std::{
 use tandem_episodes::live::{LiveEvent, LiveView, Onlookers, STEPS_PER_FRAME};
 use tokio::sync::broadcast;
 
-/// Number of events a watcher may lag behind: ten simulated seconds.
+/// Number of events that a watcher may lag behind: ten simulated seconds.
 const KEPT_EVENTS: usize = 256;
 
-/// Long-term minimum time between two steps that watchers receive; a page does not draw more often.
+/// Minimum average time between two steps that watchers receive. A page does not draw more often.
 const FRAME_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Lead over `FRAME_INTERVAL` up to which steps are sent at once.
+/// Maximum lead over an even rate of one step per `FRAME_INTERVAL`; within it, steps are sent at once.
 ///
-/// It corresponds to ten simulated seconds, so a single command of an agent is sent whole, however fast
-/// it is simulated.
+/// The lead corresponds to ten simulated seconds, so all drawn steps of an agent's command are sent, however
+/// fast it is simulated.
 const MAX_LEAD: Duration = Duration::from_secs(5);
 
 /// Events of an episode, for any number of watchers.
@@ -41,7 +41,7 @@ pub struct EveryStep(Arc<AtomicUsize>);
 pub struct LiveWatch {
     /// State of the episode when the watch began.
     pub view: LiveView,
-    /// Events after that view. `view` may already contain some of them.
+    /// Events after the subscription. `view` may already include the first of them.
     pub events: broadcast::Receiver<LiveEvent>,
 }
 
@@ -54,7 +54,7 @@ pub struct FeedEnd {
 
 /// Rate limit of the steps that watchers receive.
 struct Pace {
-    /// Time of the last step, if the steps sent up to now had been sent at one step per interval.
+    /// Time until which the steps sent so far would last at the even rate of one step per `FRAME_INTERVAL`.
     even_at: Cell<Instant>,
 }
 
@@ -78,7 +78,7 @@ impl LiveFeed {
             || events.as_ref().is_some_and(|events| events.receiver_count() > 0)
     }
 
-    /// Sends every step for as long as the return value is held.
+    /// Makes the feed send every step for as long as the returned guard is held.
     pub fn every_step(&self) -> EveryStep {
         self.drivers.fetch_add(1, Ordering::Relaxed);
         EveryStep(self.drivers.clone())
@@ -125,7 +125,7 @@ impl Onlookers for FeedEnd {
     }
 
     fn tell(&self, event: LiveEvent) {
-        // The last watcher may just have gone.
+        // The last watcher may just have left.
         let _ = self.events.send(event);
     }
 }
@@ -139,7 +139,7 @@ mod tests {
         let begin = Instant::now();
         let pace = Pace { even_at: Cell::new(begin) };
         let mut told = 0;
-        // 800 steps a second are available for ten seconds.
+        // The episode offers 800 steps per second for ten seconds.
         for step in 0..8000u32 {
             told += u32::from(pace.allows(begin + Duration::from_micros(1250) * step));
             if step == 200 {

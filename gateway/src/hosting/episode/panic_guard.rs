@@ -11,7 +11,7 @@ use tandem_tools_spec::{EndReason, ResultReply};
 use crate::hosting::HostingError;
 use crate::metrics::Metrics;
 
-/// A session until it has panicked.
+/// A session that is usable until it panics.
 pub struct PanicGuard {
     state: GuardState,
     metrics: EpisodeMetrics,
@@ -19,8 +19,8 @@ pub struct PanicGuard {
 
 enum GuardState {
     Sound(Box<Session>),
-    /// After a panic the state of the world is undefined and no longer used. The result covers the files that
-    /// could be closed.
+    /// The session has panicked, and its world is no longer used because its state is undefined. The value is
+    /// the result, if the recording could be closed.
     Panicked(Option<Box<ResultReply>>),
 }
 
@@ -31,7 +31,7 @@ impl PanicGuard {
         PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
     }
 
-    /// Guards a session that has been brought back and counted up to its current state.
+    /// Guards a restored session that the metrics already include up to its current state.
     pub fn again(session: Session, metrics: EpisodeMetrics) -> PanicGuard {
         PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
     }
@@ -40,8 +40,8 @@ impl PanicGuard {
     ///
     /// # Errors
     ///
-    /// A panic ends the episode and closes its recording. This and every later call then return
-    /// [`HostingError::EpisodePanicked`].
+    /// Returns an error if `work` panics. The panic ends the episode and closes its recording. This and every
+    /// later call then return [`HostingError::EpisodePanicked`].
     pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> T) -> Result<T, HostingError> {
         let GuardState::Sound(session) = &mut self.state else { return Err(HostingError::EpisodePanicked) };
         match catch_unwind(AssertUnwindSafe(|| work(session))) {
@@ -111,7 +111,8 @@ impl PanicGuard {
         else {
             return;
         };
-        // The broken world may panic again meanwhile. The part flushed by then stays readable.
+        // The broken world may panic again during the closing. The part of the recording flushed by then
+        // stays readable.
         let why = format!("by a panic: {}", text(&*panic));
         match closed(|| session.close_failed(why)) {
             Ok(result) => self.state = GuardState::Panicked(Some(Box::new(result))),
@@ -135,7 +136,7 @@ impl EpisodeMetrics {
         EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
     }
 
-    /// Continues the counts of an episode that has been counted up to the state of `session`.
+    /// Continues counting an episode that the metrics already include up to the state of `session`.
     pub fn again(metrics: Arc<Metrics>, session: &Session) -> EpisodeMetrics {
         EpisodeMetrics {
             metrics,

@@ -1,4 +1,4 @@
-//! The queue of jobs for the thread of an episode. A job wakes up an episode that sleeps.
+//! The queue of jobs for the thread of an episode. A job resumes a suspended episode.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -12,8 +12,8 @@ use super::{
 };
 use crate::hosting::HostingError;
 
-/// Maximum number of calls that may wait for one episode. A policy needs one at a time; a few more absorb
-/// a burst.
+/// Maximum number of calls that may wait for one episode. A policy makes one call at a time; the remaining
+/// capacity absorbs bursts.
 pub const WAITING_CALLS: usize = 16;
 
 /// Sending end of the queue.
@@ -24,7 +24,7 @@ pub struct JobQueue {
 }
 
 impl JobQueue {
-    /// Creates the sending end of the channel `jobs`, whose thread plays the episode of `stage`.
+    /// Creates the queue with the sender `jobs` to the thread that plays the episode of `stage`.
     pub fn new(stage: Arc<Stage>, jobs: mpsc::Sender<Job>) -> JobQueue {
         JobQueue { jobs: Mutex::new(jobs), stage }
     }
@@ -34,7 +34,7 @@ impl JobQueue {
         self.lock().is_closed()
     }
 
-    /// Does `work` in its turn, unless too many jobs are waiting already.
+    /// Runs `work` in its turn. Returns an error if too many jobs are waiting already.
     pub async fn work_unless_full<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
@@ -44,7 +44,7 @@ impl JobQueue {
         outcome.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Does `work` in its turn, however many jobs are waiting.
+    /// Runs `work` in its turn, however many jobs are waiting.
     pub async fn work<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
@@ -62,8 +62,8 @@ impl JobQueue {
         self.work(|desk| desk.run(work)).await
     }
 
-    /// Runs `work` on the session, unless too many jobs are waiting already. For threads outside the
-    /// async runtime.
+    /// Runs `work` on the session, for threads outside the async runtime. Returns an error if too many jobs
+    /// are waiting already.
     pub fn run_blocking<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Session) -> Outcome<T> + Send + 'static,
@@ -82,24 +82,24 @@ impl JobQueue {
         Ok(())
     }
 
-    /// Queues a job if no other waits.
+    /// Queues a job if no other job waits.
     pub fn send_if_idle(&self, job: Job) {
         let jobs = self.lock();
         if jobs.capacity() == jobs.max_capacity() {
-            // An episode that has stopped meanwhile has no more work.
+            // The error of an episode that has stopped meanwhile is ignored.
             let _ = jobs.try_send(job);
         }
     }
 
     /// Queues a job. Blocks while the queue is full, so it must not be called from async code.
     pub fn send_blocking(&self, job: Job) {
-        // An episode that has stopped meanwhile has ended.
+        // The error of an episode that has stopped meanwhile is ignored.
         if let Ok(jobs) = self.sender() {
             let _ = jobs.blocking_send(job);
         }
     }
 
-    /// Queues a job, unless too many are waiting already.
+    /// Queues a job. Returns an error if too many jobs are waiting already.
     pub fn send(&self, mut job: Job) -> Result<(), HostingError> {
         loop {
             job = match self.sender()?.try_send(job) {
@@ -112,7 +112,7 @@ impl JobQueue {
         }
     }
 
-    /// Returns the queue of the thread. Starts the thread if the episode sleeps.
+    /// Returns the sender to the episode's thread. Starts the thread if the episode is suspended.
     fn sender(&self) -> Result<mpsc::Sender<Job>, HostingError> {
         self.stage.status.is_used();
         let mut jobs = self.lock();
@@ -135,11 +135,11 @@ impl JobQueue {
     }
 }
 
-/// Makes a job of `work`, and returns it with the receiver of its outcome.
+/// Wraps `work` in a job, and returns the job with the receiver of its outcome.
 pub fn job<T: Send + 'static>(
     work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
 ) -> (Job, oneshot::Receiver<Outcome<T>>) {
     let (reply, outcome) = oneshot::channel();
-    // Work that is done stays done even if the caller has gone.
+    // The outcome is dropped if the caller has stopped waiting; the work keeps its effect.
     (Box::new(move |desk| drop(reply.send(desk.and_then(work)))), outcome)
 }

@@ -19,7 +19,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Surroundings {
     pub folder: RunFolder,
-    /// One of the server's places for episodes, released when the episode is closed.
+    /// Permit for one of the server's episodes, released when the episode is closed.
     pub place: OwnedSemaphorePermit,
     pub metrics: Arc<Metrics>,
     pub memory: Arc<dyn HostMemory>,
@@ -27,18 +27,19 @@ pub struct Surroundings {
     pub journals: Option<LiveFolder>,
 }
 
-/// State that a host keeps of an episode besides its world.
+/// State that a host keeps for an episode besides its world.
 pub trait HostMemory: std::fmt::Debug + Send + Sync {
-    /// Returns the part of it that affects later answers.
+    /// Returns the part of the state that affects later answers.
     fn memory(&self) -> Value;
 
-    /// Restores the memory of another process, and the answers and notes that may be requested again.
+    /// Restores the memory that another process has written, and the answers and notes that may be requested
+    /// again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
-    /// Drops the data that [`HostMemory::restore`] brings back, because the episode is suspended.
+    /// Drops the data that [`HostMemory::restore`] restores, because the episode is suspended.
     fn let_go(&self);
 
-    /// Returns true if a player in this process would miss the episode.
+    /// Returns true if the episode must not be suspended, because a driver or a pending command needs it.
     fn is_busy(&self) -> bool;
 }
 
@@ -51,12 +52,12 @@ pub struct Stage {
     pub metrics: Arc<Metrics>,
     pub status: SharedStatus,
     pub feed: LiveFeed,
-    /// Place that the episode takes among the server's episodes.
+    /// Permit for one of the server's episodes; `None` once it is released.
     pub place: Mutex<Option<OwnedSemaphorePermit>>,
     pub memory: Arc<dyn HostMemory>,
     /// Folder of the journals; `None` for an episode without a journal.
     pub journals: Option<LiveFolder>,
-    /// Held by the thread that plays; one does at a time.
+    /// Lock held by the thread that plays the episode, so that only one thread plays at a time.
     pub turn: Mutex<()>,
 }
 
@@ -78,7 +79,7 @@ impl Stage {
         }
     }
 
-    /// Removes the journal of a suspended episode, which will not be brought back.
+    /// Removes the journal of a suspended episode, so that the episode cannot be restored.
     pub fn forget_journal(&self) -> Result<(), HostingError> {
         let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
             return Ok(());

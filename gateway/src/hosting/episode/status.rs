@@ -27,10 +27,10 @@ pub struct SharedStatus {
     thought: AtomicU64,
     /// Result of the episode once it has been closed.
     pub result: OnceLock<ResultReply>,
-    /// True if the episode can be brought back, and so suspended.
+    /// True if the episode has a journal to resume from, so that it can be suspended.
     pub durable: AtomicBool,
     sleep: Mutex<Option<Sleep>>,
-    /// True once the state from before the suspension is restored. The episode is woken up before that.
+    /// False from the suspension until the state from before it is restored.
     there: AtomicBool,
     /// Time of the last request.
     used: Mutex<Instant>,
@@ -42,7 +42,7 @@ pub struct SharedStatus {
 #[derive(Debug, Clone, Copy)]
 pub struct Sleep {
     pub since: Instant,
-    /// Policy's thinking time when the episode was suspended.
+    /// Time between the last answer to the policy and the suspension.
     pub thinking: Duration,
 }
 
@@ -64,7 +64,7 @@ impl Default for SharedStatus {
 }
 
 impl SharedStatus {
-    /// Returns the status of an episode that sleeps after `entries` of its journal.
+    /// Returns the status of a suspended episode whose journal contains `entries`.
     pub fn asleep<'a>(entries: impl Iterator<Item = &'a JournalEntry>, hold_steps: u32) -> SharedStatus {
         let status = SharedStatus::default();
         let mut first = None;
@@ -84,7 +84,7 @@ impl SharedStatus {
         status
     }
 
-    /// Copies the state of `session`.
+    /// Updates the status from the state of `session`.
     pub fn update(&self, session: &PanicGuard) {
         if let Some(reason) = session.ended() {
             self.ended.get_or_init(|| reason);
@@ -113,7 +113,7 @@ impl SharedStatus {
         Duration::from_nanos(self.thought.load(Relaxed))
     }
 
-    /// Records that a request has come.
+    /// Sets the time of the last request to now.
     pub fn is_used(&self) {
         *lock(&self.used) = Instant::now();
     }
@@ -122,7 +122,7 @@ impl SharedStatus {
         lock(&self.used).elapsed()
     }
 
-    /// Records that a call was refused.
+    /// Stores the reason why a call was refused.
     pub fn refuse(&self, why: String) {
         *lock(&self.refusal) = Some(why);
     }
@@ -131,13 +131,13 @@ impl SharedStatus {
         lock(&self.refusal).clone()
     }
 
-    /// Marks the episode as suspended; `thinking` is the time since the policy was last answered.
+    /// Marks the episode as suspended. `thinking` is the time since the last answer to the policy.
     pub fn fall_asleep(&self, thinking: Duration) {
         self.there.store(false, Release);
         *lock(&self.sleep) = Some(Sleep { since: Instant::now(), thinking });
     }
 
-    /// Marks the episode as suspended again, as before.
+    /// Marks the episode as suspended again with the same data, after it could not be resumed.
     pub fn sleep_on(&self, sleep: Sleep) {
         *lock(&self.sleep) = Some(sleep);
     }

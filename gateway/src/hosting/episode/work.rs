@@ -1,4 +1,5 @@
-//! The thread that plays an episode, from its start or its journal to its end or its sleep.
+//! The thread that plays an episode, from the start or the replay of the journal to the end or the
+//! suspension.
 
 use std::{
     sync::{Arc, PoisonError},
@@ -20,14 +21,14 @@ use crate::hosting::{
     durable::{Commit, JournalFile, JournalReader, Lease, Leasing},
 };
 
-/// Stack size; the contact solver keeps large temporaries on the stack.
+/// Stack size in bytes; the contact solver keeps large temporaries on the stack.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Origin of a thread's session.
 pub enum Opening {
     /// The episode begins.
     New { clock: Clock, started: oneshot::Sender<Result<Briefing, EpisodeError>> },
-    /// The episode is brought back; `thinking` is the time since its policy was last answered.
+    /// The episode is restored from its journal. `thinking` is the time since the last answer to the policy.
     Again { thinking: Duration },
 }
 
@@ -48,7 +49,7 @@ fn play(stage: &Arc<Stage>, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     let desk = match opening {
         Opening::New { clock, started } => match stage.begin(clock) {
             Ok((session, briefing)) => {
-                // A caller that went away during the start has dropped the other end of the inbox, and
+                // If the caller has disconnected during the start, the sender of the inbox is dropped and
                 // `work` returns.
                 let _ = started.send(Ok(briefing));
                 Desk::new(stage.clone(), session, None)
@@ -72,7 +73,8 @@ fn play(stage: &Arc<Stage>, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     };
     let Left::Closed(closed) = desk.work(inbox) else { return };
     stage.feed.close();
-    // The place is freed before the caller receives the result, so that it can start the next episode.
+    // The permit is released before the caller receives the result, so that the caller can start the next
+    // episode.
     stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some((reply, result)) = closed {
         let _ = reply.send(*result);
@@ -113,7 +115,7 @@ impl Stage {
             notes.append(&mut noted);
             memory = remembered.or(memory);
         }
-        // A recording that is complete is not written again.
+        // A complete recording is not written again.
         let is_written = entries.last().is_some_and(|entry| entry.ended.is_some())
             && self.folder.path.join(RESULT_FILE).exists();
         let session = Session::bring_back(BringBack {

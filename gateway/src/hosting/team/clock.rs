@@ -1,8 +1,10 @@
-//! The clock of one operator: it runs while the operator thinks and the episode may have to wait for it.
+//! Clock of one operator. It runs while the operator thinks and the episode may have to wait for the
+//! operator.
 //!
-//! It begins with the operator's first request. It is paused while the operator's command waits or is
-//! executed, and once nobody waits for the operator any more. Each operator has the whole limit of the
-//! protocol. An operator in real time commands once in a control step, and thinks only beyond that step.
+//! The clock starts with the operator's first request. It is paused while the operator's command is pending
+//! or being executed, and once nobody waits for the operator any more. The protocol's limit applies to each
+//! operator separately. For an operator in real time, which sends one command per control step, only time
+//! beyond that step counts as thinking.
 
 use std::time::{Duration, Instant};
 
@@ -10,52 +12,53 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Default)]
 pub struct OperatorClock {
     spent: Duration,
-    /// Moment when it began to run, or will begin; `None` while it is paused.
+    /// Time at which the clock last started or will start; `None` while it is paused.
     since: Option<Instant>,
-    /// Time after a command that counts as pacing.
+    /// Time after a command that is not charged as thinking.
     pace: Duration,
 }
 
 impl OperatorClock {
-    /// Starts the clock unless it runs already. For an operator in real time it starts after the pacing.
+    /// Starts the clock after the pacing time, unless it runs already.
     pub fn run(&mut self) {
         let pace = self.pace;
         self.since.get_or_insert_with(|| Instant::now() + pace);
     }
 
-    /// Sets the time after a command that counts as pacing: a control step in real time, and otherwise 0.
+    /// Sets the pacing time after a command, which is not charged: one control step in real time, otherwise
+    /// 0.
     pub fn set_pace(&mut self, pace: Duration) {
         self.pace = pace;
     }
 
-    /// Stands from now on.
+    /// Stops the clock.
     pub fn stop(&mut self) {
         self.spent = self.thought();
         self.since = None;
     }
 
-    /// Returns the running time up to the last pause.
+    /// Returns the thinking time up to the last pause.
     pub fn spent(&self) -> Duration {
         self.spent
     }
 
-    /// Returns the time for which it has run.
+    /// Returns the thinking time up to now.
     pub fn thought(&self) -> Duration {
         self.spent + self.running().unwrap_or_default()
     }
 
-    /// Returns the time since it began to run; `None` while it is paused.
+    /// Returns the time since the clock last started; `None` while it is paused.
     pub fn running(&self) -> Option<Duration> {
         self.since.map(|since| since.elapsed())
     }
 
-    /// Adds the time of an earlier process.
+    /// Adds thinking time that an earlier process has measured.
     pub fn add(&mut self, earlier: Duration) {
         self.spent += earlier;
     }
 }
 
-/// Returns seconds to the millisecond, as replies have them.
+/// Converts a duration to seconds, rounded to milliseconds, for replies.
 pub(super) fn to_ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e3).round() / 1e3
 }

@@ -1,6 +1,6 @@
-//! A collection: people who play one episode after another on a server of their own.
+//! A collection of demonstrations: people play one episode after another on a server used only for this.
 //!
-//! Each person has an operator's token that stays the same, and marks every episode as good or bad.
+//! Each person keeps the same operator's token, and marks every episode as good or bad.
 
 use std::{
     fmt,
@@ -12,40 +12,40 @@ use tandem_tools_spec::OperatorToken;
 
 use crate::token::{Token, TokenError};
 
-/// Episodes that the same people play.
+/// A series of episodes that the same people play.
 pub struct Collection {
     seats: Vec<(Token, OperatorToken)>,
     progress: Mutex<CollectionProgress>,
-    /// Notified when a person has marked the last episode.
+    /// Notified when a person has marked the episode that was played last.
     marked: Condvar,
 }
 
-/// Progress of a collection, as pages show it.
+/// Progress of a collection, for the operators' pages.
 #[derive(Debug, Clone, Serialize)]
 pub struct CollectionProgress {
-    /// Current task of the people.
+    /// Current activity of the people.
     pub stage: CollectionStage,
-    /// Episode that is played, or was played last.
+    /// Episode that is being played, or otherwise the episode that was played last.
     pub episode: Option<CollectedEpisode>,
     /// Number of planned episodes.
     pub planned: usize,
-    /// Number of good episodes among those played since this server began.
+    /// Number of good episodes since this server started.
     pub good: usize,
-    /// Number of episodes among them that a person marked bad.
+    /// Number of episodes since this server started that a person marked bad.
     pub bad: usize,
-    /// Marks that people have given the episode, by seat.
+    /// Marks of `episode` by seat: true for good, false for bad, `None` before the person has marked it.
     pub marks: Vec<Option<bool>>,
 }
 
-/// Current task of the people in a collection.
+/// Current activity of the people in a collection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CollectionStage {
-    /// Wait for the next episode.
+    /// They wait for the next episode.
     Preparing,
-    /// Play.
+    /// They play.
     Playing,
-    /// Mark the episode as good or bad.
+    /// They mark the episode as good or bad.
     Marking,
     /// The collection is complete.
     Over,
@@ -89,7 +89,7 @@ impl Collection {
         Ok(Collection { seats, progress: Mutex::new(progress), marked: Condvar::new() })
     }
 
-    /// Returns the tokens that people need.
+    /// Returns the operators' tokens.
     pub fn operators(&self) -> impl Iterator<Item = &OperatorToken> {
         self.seats.iter().map(|(_, operator)| operator)
     }
@@ -100,7 +100,8 @@ impl Collection {
         Some((token.clone(), operator.token.clone()))
     }
 
-    /// Returns the robot whose person has the token `text`. Every token is compared.
+    /// Returns the robot whose person has the token `text`. Compares every token, so that the time taken does
+    /// not reveal the match.
     pub fn robot_of(&self, text: &str) -> Option<&str> {
         let robots = self.seats.iter().map(|(token, seat)| (token.matches(text), seat.robot.as_str()));
         robots.fold(None, |found, (matches, robot)| if matches { Some(robot) } else { found })
@@ -111,7 +112,7 @@ impl Collection {
         self.lock().clone()
     }
 
-    /// Opens the next episode for playing.
+    /// Makes `episode` the episode that is being played, and clears the marks.
     pub fn begin(&self, episode: CollectedEpisode) {
         let mut progress = self.lock();
         progress.stage = CollectionStage::Playing;
@@ -137,8 +138,8 @@ impl Collection {
         bad
     }
 
-    /// Marks the episode for the person of `robot`. Returns false outside the marking stage, when marks
-    /// are not kept.
+    /// Marks the episode for the person of `robot`. Returns false and keeps no mark outside the marking
+    /// stage.
     ///
     /// A mark can be changed until everybody has marked.
     pub fn mark(&self, robot: &str, good: bool) -> bool {

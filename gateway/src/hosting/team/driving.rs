@@ -1,14 +1,14 @@
-//! Control in real time by people, and by programs that speak as their page does.
+//! Real-time control by people, and by programs that use the same protocol as the page for people.
 //!
 //! A page sends up to 50 setpoints a second for its robot's wrists, fingers and base; a program may send
-//! joint targets or setpoints of motors. Every control step, the latest setpoint becomes a command of one
-//! step by the operator of that robot. It goes through the team's rounds like any other command. So the
-//! world runs no faster than real time, and pauses while a person is away.
+//! joint targets or setpoints of motors. In every control step, the latest setpoint becomes a one-step
+//! command of the robot's operator, which goes through the team's rounds like any other command. The world
+//! therefore runs no faster than real time, and pauses while a person is away.
 //!
-//! A log of 50 commands a second replays bit for bit. The wall clock only decides, before a call is made,
+//! A recording of such an episode replays bit for bit. The wall clock only decides, before a call is made,
 //! which setpoint becomes a command. The session sees whole control steps in the order of its calls. The
-//! recording holds each call with exact numbers, and replay makes the same calls again. Setpoints that
-//! were never commanded leave no trace in the world or the log.
+//! recording holds each call with exact numbers, and replay makes the same calls again. Setpoints that were
+//! never commanded leave no trace in the world or the log.
 
 use std::time::Instant;
 
@@ -24,23 +24,24 @@ use super::{
 };
 use crate::hosting::{Answer, HostingError};
 
-/// Number of answers that a page may lag behind.
+/// Maximum number of answers queued for a page.
 const KEPT_ANSWERS: usize = 64;
 
-/// A person who drives; dropping it releases the robots.
+/// A person's real-time control of robots. Dropping the value releases the robots.
 #[derive(Debug)]
 pub struct Driver {
-    /// The operator of the person's own robot, and those of the robots that stand still.
+    /// Operators of the person's robot, which is the first, and of the robots that this person makes hold
+    /// still.
     operators: Vec<OperatorHandle>,
     number: u64,
 }
 
 impl Driver {
-    /// Takes control of `robots` of the episode of `operator`. The first is the person's own; the others
-    /// stand still.
+    /// Takes control of `robots` in the episode of `operator`. The person drives the first robot; the others
+    /// hold still.
     ///
-    /// Earlier drivers of these robots lose control, because a reloaded page is the same person. The
-    /// receiver gets the answers to the commands.
+    /// Earlier drivers of these robots lose control, because the same person may have reloaded the page. The
+    /// returned receiver gets the answers to the commands.
     pub fn take(
         operator: &OperatorHandle,
         robots: &[String],
@@ -63,7 +64,8 @@ impl Driver {
         Ok((Driver { operators, number }, answers))
     }
 
-    /// Sets the person's request for its own robot. The others stand still, and their clocks run, too.
+    /// Sets the person's request for the first robot. The other robots hold still, and time passes for them,
+    /// too.
     pub fn say(&self, request: &DriverRequest) {
         self.each(|place, own| {
             if let Some(teleoperation) = own.as_mut().filter(|own| own.driver == self.number) {
@@ -75,8 +77,8 @@ impl Driver {
         });
     }
 
-    /// Returns the robots that the person waits for, once the person's own command has waited for longer than
-    /// `AWAY_AFTER`.
+    /// Returns the robots that the person waits for, once the person's command has been pending for longer
+    /// than `AWAY_AFTER`. The list is empty before.
     pub fn waits_for(&self) -> Vec<String> {
         let Some(OperatorHandle { team, seat, .. }) = self.operators.first() else { return Vec::new() };
         let round = team.round();
@@ -86,7 +88,8 @@ impl Driver {
         }
     }
 
-    /// Calls `change` on the driving state of each of the person's robots, its own first.
+    /// Calls `change` with the index and the driving state of each of the robots; the person drives the
+    /// first.
     fn each(&self, mut change: impl FnMut(usize, &mut Option<Teleoperation>)) {
         let Some(OperatorHandle { team, .. }) = self.operators.first() else { return };
         let mut round = team.round();
@@ -124,8 +127,8 @@ async fn turn(any: OperatorHandle) {
     }
 }
 
-/// Commands a setpoint and sends the driver the answer, with the robot's state if the driver has asked for
-/// it.
+/// Executes a setpoint as a command and sends the driver the answer, with the robot's state if `tells_state`
+/// is true.
 async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool) {
     let mut answers = vec![operator.call(setpoint.call().into(), None).await];
     if tells_state {
@@ -136,7 +139,7 @@ async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool
         own.under_way = None;
         if let Some(teleoperation) = &own.teleoperation {
             for answer in answers {
-                // A page that does not read its answers misses some.
+                // A page that does not read its answers in time misses some of them.
                 let _ = teleoperation.answers.try_send(answer);
             }
         }

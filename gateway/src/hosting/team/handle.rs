@@ -1,4 +1,4 @@
-//! The operator of one robot of an episode. Its calls block until its robot's reply is ready.
+//! Calls of the operator of one robot of an episode. A call waits until the robot's reply is ready.
 
 use std::sync::{Arc, MutexGuard};
 
@@ -45,7 +45,7 @@ impl OperatorHandle {
         self.team.round()
     }
 
-    /// Calls `work` on the operator's part of the round.
+    /// Calls `work` with the operator's state in the round.
     pub(super) fn own<T>(&self, work: impl FnOnce(&mut Operator) -> T) -> T {
         work(&mut self.round().operators[self.seat])
     }
@@ -76,7 +76,7 @@ impl OperatorHandle {
         }
     }
 
-    /// Has the episode answer a call; `then` converts the answer for the operator.
+    /// Passes a call to the episode. `then` converts the answer for the operator.
     async fn ask(
         &self,
         call: Call,
@@ -88,7 +88,7 @@ impl OperatorHandle {
         self.episode.ask(Some(self.robot()), call, keyed, then).await
     }
 
-    /// Notes that the operator has observed, and adds the actions of the others to a status.
+    /// Records that the operator has observed the current state. Adds the actions of the others to a status.
     fn looked(&self, answer: Answer) -> Answer {
         let mut round = self.round();
         round.operators[self.seat].has_looked();
@@ -124,10 +124,11 @@ impl OperatorHandle {
         .await
     }
 
-    /// Takes a command and answers when it has been executed.
+    /// Executes a command and returns its answer.
     ///
     /// People and programs that drive in real time command one step each. Beside them, a longer command
-    /// continues over as many of their rounds as it has steps. Commands of an expert or a policy always do.
+    /// continues over as many of their rounds as it has steps. Commands of an expert or a policy always
+    /// continue in this way.
     async fn act(&self, call: OperatorCall, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
         if call.call().steps() <= 1 || !self.goes_on() {
             return self.act_once(call, keyed).await;
@@ -136,7 +137,7 @@ impl OperatorHandle {
         self.finish_all(keyed, async move { own.act_on(call).await }).await
     }
 
-    /// Takes a command that goes on after shorter ones of the others.
+    /// Executes a command that continues after shorter commands of the others have ended.
     pub(super) async fn act_on(&self, mut left: OperatorCall) -> Result<Answer, HostingError> {
         let (mut executed_steps, mut heard, mut partners) = (0, Vec::new(), Vec::new());
         loop {
@@ -156,8 +157,7 @@ impl OperatorHandle {
         }
     }
 
-    /// Completes the work that has begun, even if its caller leaves, and keeps the answer to a call with a
-    /// key.
+    /// Runs `work` to its end even if the caller leaves, and keeps the answer to a call with a key.
     pub(super) async fn finish_all(
         &self,
         keyed: Option<Keyed>,
@@ -178,8 +178,8 @@ impl OperatorHandle {
         self.round().goes_on(self.seat)
     }
 
-    /// Notes that the operator sends control steps in real time. Commands of its partners continue over these
-    /// steps, and the steps' own duration is not charged as thinking.
+    /// Records that the operator sends single control steps in real time. Partners' commands continue over
+    /// these steps, and the duration of a step is not charged as thinking time.
     pub fn pace(&self) {
         self.own(|own| {
             own.set_pace(TICK);
@@ -187,10 +187,10 @@ impl OperatorHandle {
         });
     }
 
-    /// Takes a command and answers when the step has been made.
+    /// Adds a command to the next step and returns its answer when the step has been executed.
     async fn act_once(&self, call: OperatorCall, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
         self.round().admit(self.seat)?;
-        // A command that cannot be executed is refused before the others depend on it.
+        // A command that cannot be executed is refused before it becomes part of the round.
         let place = self.team.take_place(call.robot())?;
         let command = self.episode.read_command(call).await?;
         drop(place);
@@ -204,8 +204,8 @@ impl OperatorHandle {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Lets the operator leave. The episode ends when the last operator has left. Until then its robot holds
-    /// still, and the answer is the episode's status.
+    /// Marks the operator as finished. The last operator to finish ends the episode. For the others the
+    /// answer is the episode's status, and their robots hold still.
     async fn finish(&self, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
         let others_play_on = !self.episode.ended() && self.round().finish(self.seat)?;
         let call: ToolCall = match others_play_on {
@@ -222,8 +222,8 @@ impl OperatorHandle {
         self.ask(call.into(), keyed, then).await
     }
 
-    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if the
-    /// operator had finished. The episode ends when no operator plays.
+    /// Returns an error once the operator has used up its thinking time. Its robot then holds still, as if
+    /// the operator had finished. The episode ends if no other operator plays.
     fn check_clock(&self) -> Result<(), HostingError> {
         let limit = self.team.rules.thinking_limit;
         let Some(limit) = limit.filter(|limit| self.own(|own| own.thought()) >= *limit) else {
@@ -237,7 +237,8 @@ impl OperatorHandle {
         Err(HostingError::OperatorOutOfTime { robot: self.robot().into(), limit_s: limit.as_secs() })
     }
 
-    /// Makes the step if no operator is awaited; otherwise starts the patience timer.
+    /// Begins the step if no operator's command is missing; otherwise starts the patience timer. Does nothing
+    /// if no operator has commanded.
     pub(super) fn go_on(&self) {
         let mut round = self.round();
         if !round.may_begin() {
@@ -264,7 +265,7 @@ impl OperatorHandle {
         tokio::spawn(async move { own.execute(pending).await });
     }
 
-    /// Makes the step with the operators that have commanded, and sends each its answer.
+    /// Executes the step with the pending commands, and sends each operator its answer.
     async fn execute(&self, pending: Vec<(usize, Pending)>) {
         let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
         for (seat, Pending { command, keyed, reply }) in pending {
@@ -288,7 +289,7 @@ impl OperatorHandle {
         match self.episode.together(commands, then).await {
             Ok(answers) => {
                 for (reply, answer) in replies.into_iter().zip(answers) {
-                    // The step is recorded even if a caller has gone.
+                    // The step is recorded even if a caller has stopped waiting.
                     let _ = reply.send(Ok(answer));
                 }
             }
@@ -303,15 +304,14 @@ impl OperatorHandle {
         self.go_on();
     }
 
-    /// Restricts an answer to the parts that the operator may see, and adds the messages that it has not
-    /// received yet.
+    /// Restricts an answer to the parts that the operator may see, and adds the operator's unread messages.
     fn own_answer(&self, answer: Answer) -> Answer {
         let (heard, thought) = self.own(|own| (own.take_heard(), own.thought()));
         let left_s = self.team.rules.thinking_limit.map(|limit| to_ms(limit.saturating_sub(thought)));
         Answer { heard, ..answer.of_own_robot(self.robot()).with_clock_left(left_s) }
     }
 
-    /// Returns the behaviour of the operator's partners, out of that of all robots in `did`.
+    /// Returns the behaviour of the operator's partners, selected from `did`, which covers all robots.
     fn partners(&self, did: &[PartnerDid], tools: &[(usize, &'static str)]) -> Vec<Partner> {
         let others = self.team.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != self.seat);
         let partner = |(other, (who, did)): (usize, (&super::Seat, &PartnerDid))| {

@@ -1,9 +1,9 @@
 //! The operators of an episode in which each robot has one.
 //!
-//! A step is made once every operator has commanded, or the time limit for the missing ones is over. Robots
-//! of silent operators then hold still, and nobody waits for these operators until they call again. All
-//! commands end with the shortest one. Each operator has a clock of its own. An operator's call blocks until
-//! the reply for its robot is ready.
+//! A step is executed once every operator has commanded, or once the time limit for missing commands (the
+//! patience) is over. Robots of silent operators then hold still, and nobody waits for these operators until
+//! they call again. All commands end with the shortest one. Each operator has a separate clock. An operator's
+//! call blocks until the reply for its robot is ready.
 
 mod clock;
 mod collection;
@@ -46,24 +46,24 @@ pub struct Team {
     round: Mutex<Round>,
 }
 
-/// Place of the operator of one robot.
+/// Seat of the operator of one robot.
 #[derive(Debug)]
 struct Seat {
     robot: String,
     token: Token,
-    /// Places for calls that wait for the episode: an equal share, so that operators do not block each
-    /// other.
+    /// Permits for calls that wait for the episode. Each operator has an equal share, so that operators do
+    /// not block each other.
     places: Semaphore,
 }
 
-/// Returns the number of calls that may wait for each of `operators`.
+/// Returns the number of waiting calls allowed for each of `operators` operators.
 fn own_calls(operators: usize) -> usize {
     (WAITING_CALLS / operators.max(1)).max(1)
 }
 
 impl Team {
-    /// Creates an operator for each of `robots` and returns their tokens. A robot with a seat in
-    /// `collection` keeps its token.
+    /// Creates an operator for each of `robots` and returns their tokens. An operator with a seat in a
+    /// collection keeps that seat's token.
     pub fn new<'a>(
         robots: impl Iterator<Item = &'a str>,
         driving: &Driving,
@@ -79,7 +79,7 @@ impl Team {
         Ok((Team::of(&tokens, driving, rules)?, tokens))
     }
 
-    /// Restores the operators that have these tokens.
+    /// Creates the team of a restored episode, whose operators have these tokens.
     pub fn of(tokens: &[OperatorToken], driving: &Driving, rules: TeamRules) -> Result<Team, HostingError> {
         let mut seats = Vec::new();
         for OperatorToken { robot, token } in tokens {
@@ -91,7 +91,8 @@ impl Team {
         Ok(Team { seats, patience, talk: driving.talk == Some(true), rules, round })
     }
 
-    /// Returns the robot whose operator has the token `text`. Every token is compared.
+    /// Returns the robot whose operator has the token `text`. Compares every token, so that the time taken
+    /// does not reveal the match.
     pub fn robot_of(&self, text: &str) -> Option<&str> {
         let mut robot = None;
         for seat in &self.seats {
@@ -102,7 +103,7 @@ impl Team {
         robot
     }
 
-    /// Takes one of the places that the operator of `robot` has for calls that wait for the episode.
+    /// Acquires a permit of the operator of `robot` for a call that waits for the episode.
     pub fn take_place(&self, robot: &str) -> Result<SemaphorePermit<'_>, HostingError> {
         let seat = &self.seats[self.seat(robot)?];
         let limit = own_calls(self.seats.len());
@@ -114,33 +115,33 @@ impl Team {
         self.round().memory()
     }
 
-    /// Restores the kept state.
+    /// Restores the operators' state from `memory`.
     pub fn restore(&self, memory: Vec<OperatorMemory>) {
         self.round().restore(memory);
     }
 
-    /// Returns true if a player in this process drives, or waits for others.
+    /// Returns true if a partner or a real-time driver has a robot, or if a command waits for execution.
     pub fn is_busy(&self) -> bool {
         self.round().is_busy()
     }
 
-    /// Returns true if operators may talk.
+    /// Returns true if operators may send messages to each other.
     pub fn may_talk(&self) -> bool {
         self.talk
     }
 
-    /// Stops execution; waiting operators receive an error.
+    /// Drops the pending commands; the operators that wait for them receive an error.
     pub fn stop(&self) {
-        // Dropping the commands ends their replies.
+        // Dropping a command closes the channel of its reply.
         drop(self.round().begin());
     }
 
-    /// Returns true while a partner still has to be brought back.
+    /// Returns true while a partner of the previous server still has to be restored.
     pub fn misses_partners(&self) -> bool {
         self.round().operators.iter().any(|operator| operator.left.is_some())
     }
 
-    /// Refuses a call that names an unknown robot.
+    /// Returns an error if the call names an unknown robot.
     fn check_robots(&self, call: &Call) -> Result<(), EpisodeError> {
         let is_known = |robot: &str| self.seats.iter().any(|seat| seat.robot == robot);
         call.robots()

@@ -1,7 +1,8 @@
-//! One robot of an episode, for a player that plays all robots while others drive the rest.
+//! Adapter through which a player written for all robots drives one robot, while other operators drive the
+//! rest.
 //!
-//! The robot executes its own part of each command. The parts of the other robots take as long as in that
-//! command, but their own drivers decide what they do.
+//! Only this robot's part of each command is executed. The command keeps its duration; the other robots
+//! execute the commands of their own operators.
 
 use std::{thread, time::Duration};
 
@@ -21,18 +22,18 @@ use super::{
 };
 use crate::hosting::HostingError;
 
-/// Interval between two checks whether the other operators are back.
+/// Interval at which `wait_for_others` polls the other operators.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A robot that a player of all robots drives.
+/// Robot driven by a player that is written for all robots.
 pub struct OneRobot {
     pub operator: OperatorHandle,
     pub runtime: Handle,
 }
 
 impl OneRobot {
-    /// Waits until another operator plays, because time must not pass without players. Returns false once all
-    /// have finished or the episode has ended.
+    /// Waits until another operator plays, because time must not pass without other players. Returns false
+    /// once all other operators have finished or the episode has ended.
     pub fn wait_for_others(&self) -> bool {
         loop {
             let others = self.operator.round().state_of_others(self.operator.seat);
@@ -45,8 +46,8 @@ impl OneRobot {
         }
     }
 
-    /// Answers a call of the robot's operator. A first [`HostingError::LateCommand`] is ignored and the
-    /// call repeated, because this player does not need the notice.
+    /// Answers a call of the robot's operator. Repeats the call after a first [`HostingError::LateCommand`],
+    /// because this player does not need the notice.
     pub fn ask(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
         let ask = || -> Result<ToolReply, HostingError> {
             Ok(self.runtime.block_on(self.operator.call(call.clone().into(), None))?.reply)
@@ -85,7 +86,7 @@ impl OneRobot {
     }
 }
 
-/// Converts a refusal into the player's error.
+/// Converts a refusal into a player's error.
 fn refused(tool: &'static str, error: HostingError) -> PlayerError {
     match error {
         HostingError::EpisodeStopped | HostingError::Episode(EpisodeError::Ended { .. }) => {

@@ -1,8 +1,8 @@
 //! Partners of this process that drive one robot beside people or programs: the task's expert, or a
 //! learned policy.
 //!
-//! The expert plays its script for all robots, and only the commands of its own robot are executed. If a step
-//! of the script does not succeed in time, the script gives up and begins again from the current state.
+//! The expert runs its script for all robots, but only the commands of its own robot are executed. If a step
+//! of the script does not succeed in time, the script is aborted and starts again from the current state.
 
 use std::{sync::Arc, thread};
 
@@ -22,14 +22,15 @@ use super::{
 };
 use crate::hosting::{EpisodeThread, HostingError};
 
-/// Control steps for which the robot stands before the expert's script begins again.
+/// Control steps for which the robot holds still before the expert's script starts again.
 const PAUSE_STEPS: u32 = 25;
 
 impl OperatorHandle {
-    /// Lets the expert of the task drive the robot until the episode ends or everybody else has finished.
+    /// Starts the expert of the task, which drives the robot until the episode ends or all other operators
+    /// have finished.
     ///
-    /// The expert uses privileged information. That is recorded, and results state it. Repeated requests have
-    /// no effect.
+    /// The expert uses privileged information. The recording and the results state this. Repeated requests
+    /// have no effect.
     pub async fn take_expert(&self) -> Result<(), HostingError> {
         let (robot, spec) = (self.robot(), self.episode.spec().clone());
         Expert::for_episode(&spec).map_err(HostingError::NoExpert)?;
@@ -45,11 +46,11 @@ impl OperatorHandle {
         Ok(())
     }
 
-    /// Lets `policy` drive the robot until the episode ends or everybody else has finished. Returns when it
-    /// is connected.
+    /// Starts `policy`, which drives the robot until the episode ends or all other operators have finished.
+    /// Returns when the policy is connected.
     ///
     /// The policy receives the inputs that its map names for all robots. Repeated requests have no effect
-    /// while it drives. After a lost connection it connects again.
+    /// while it drives. After a lost connection, a new request connects it again.
     pub async fn take_policy(&self, policy: Arc<dyn PartnerPolicy>) -> Result<(), HostingError> {
         self.own(|own| own.check_plays())?;
         if self.own(|own| own.partner.replace(PartnerKind::Policy)).is_some() {
@@ -70,7 +71,7 @@ impl OperatorHandle {
         }
     }
 
-    /// Stops waiting for the robot, whose partner is lost, until it is driven again.
+    /// Removes the lost partner of the robot. The others do not wait for the robot until it is driven again.
     fn lose_partner(&self) {
         self.own(|own| {
             own.fall_silent();
@@ -80,8 +81,8 @@ impl OperatorHandle {
     }
 }
 
-/// Lets the partners of `team` drive again that drove when the previous server ended; `policy` is the one
-/// that may drive here.
+/// Restores the partners of `team` that drove when the previous server ended. `policy` is the policy that may
+/// drive on this server.
 pub async fn seat_again(
     team: &Arc<Team>,
     episode: &Arc<EpisodeThread>,
@@ -108,7 +109,7 @@ pub async fn seat_again(
     }
 }
 
-/// Plays until no other operator plays.
+/// Plays the expert until no other operator plays.
 fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
     while own.wait_for_others() {
         let played = Expert::for_episode(spec).and_then(|mut expert| expert.play(&mut own));
@@ -125,12 +126,12 @@ fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
             }
         }
     }
-    // The others no longer wait for this operator. An ended episode cannot be notified.
+    // Finishing releases the others from waiting for this operator. The error of an ended episode is ignored.
     let _ = own.ask(Finish {}.into());
 }
 
-/// Plays until the episode is over or the policy is lost. A loss is noted in the recording, and the
-/// policy may be requested again.
+/// Plays the policy until the episode is over or the connection to the policy is lost. The loss is noted in
+/// the recording, and the policy may be requested again.
 fn play_policy(
     mut own: OneRobot,
     policy: &dyn PartnerPolicy,
@@ -139,7 +140,7 @@ fn play_policy(
     let mut connected = Some(connected);
     let mut answer = |came_of_it| {
         if let Some(connected) = connected.take() {
-            // The caller may have gone.
+            // The caller may have stopped waiting.
             let _ = connected.send(came_of_it);
         }
     };

@@ -1,5 +1,5 @@
-//! Plans of one operator. Each command goes through the team's rounds like any other. A partner's command
-//! continues over as many rounds as it has steps.
+//! Plans of one operator. Each command of a plan goes through the team's rounds like any other command. A
+//! partner's command continues over as many rounds as it has steps.
 
 use tandem_episodes::{OperatorCall, PlanAdvance, PlanRun};
 use tandem_tools_spec::{ActCall, Call, CommandReply, Heard, Partner, PlanCall, ToolCall, ToolReply};
@@ -7,7 +7,8 @@ use tandem_tools_spec::{ActCall, Call, CommandReply, Heard, Partner, PlanCall, T
 use super::handle::OperatorHandle;
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
-/// A plan of one operator while it is carried out; the partners' commands go on as long.
+/// A plan of one operator during its execution. Meanwhile, partners' longer commands continue after each of
+/// its commands.
 struct PlanUnderWay {
     own: OperatorHandle,
     heard: Vec<Heard>,

@@ -1,4 +1,4 @@
-//! The state of a round: the commands that operators have given for the next step.
+//! State of a round: the operators and the commands that they have given for the next step.
 
 use std::time::{Duration, Instant};
 
@@ -13,52 +13,52 @@ use super::{
 };
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
-/// Maximum number of unread messages for one operator.
+/// Maximum number of unread messages per operator.
 const MAX_UNHEARD: usize = 32;
 
-/// The operators before a step.
+/// State of the operators before a step.
 #[derive(Debug, Default)]
 pub struct Round {
     /// One operator for each robot, in the episode's order.
     pub operators: Vec<Operator>,
-    /// Number of steps that have been made.
+    /// Number of steps executed so far.
     pub number: u64,
     /// Handle that stops the patience timer; `None` while none is running.
     patience: Option<AbortHandle>,
-    /// Number of drivers up to now.
+    /// Number of real-time drivers that the team has had so far.
     pub drivers: u64,
-    /// True while a task turns setpoints into commands.
+    /// True while the Tokio task that turns setpoints into commands runs.
     pub turning: bool,
-    /// Number of plans under way.
+    /// Number of plans that are being executed.
     pub plans: u32,
 }
 
-/// The operator of one robot, and the player in this process that drives the robot.
+/// State of the operator of one robot, and of the player in this process that drives the robot, if any.
 #[derive(Debug, Default)]
 pub struct Operator {
     pub robot: String,
     state: OperatorState,
-    /// First and last step through which its robot was held without its knowledge.
+    /// First and last control step of a hold of the robot that the operator has not been notified of.
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
-    /// Number of messages it has sent.
+    /// Number of messages that the operator has sent.
     said: u32,
-    /// Number of its requests.
+    /// Number of the operator's requests.
     requests: u32,
     clock: OperatorClock,
-    /// State of the driver in real time; `None` for a robot of a program.
+    /// State of the real-time driver; `None` if the robot has none.
     pub teleoperation: Option<Teleoperation>,
-    /// Time at which the pending command of a driver was made.
+    /// Time at which the real-time driver's pending command was given.
     pub under_way: Option<Instant>,
     /// True for a program that sends one control step after another in real time.
     pub paced: bool,
-    /// Expert or policy that drives.
+    /// Expert or policy of this process that drives the robot.
     pub partner: Option<PartnerKind>,
-    /// Partner that drove when the previous server ended; `None` once it drives again.
+    /// Partner that drove when the previous server ended; `None` after the attempt to restore it.
     pub left: Option<PartnerKind>,
 }
 
-/// Driver of a robot that runs in this process.
+/// Kind of player in this process that drives a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartnerKind {
@@ -66,7 +66,7 @@ pub enum PartnerKind {
     Policy,
 }
 
-/// State of an operator that outlives the server; commands that have not been executed do not.
+/// State of an operator that outlives the server. Commands that have not been executed are not part of it.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct OperatorMemory {
     silent: bool,
@@ -78,17 +78,17 @@ pub struct OperatorMemory {
     requests: u32,
     #[serde(default)]
     thought: Duration,
-    /// Partner that drove in its place.
+    /// Partner that drove in the operator's place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     partner: Option<PartnerKind>,
 }
 
-/// State of the other operators, from the view of one.
+/// State of all operators except one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Others {
     /// At least one other operator plays.
     There,
-    /// No other operator has commanded within the patience.
+    /// All other operators are silent or have finished, and at least one is silent.
     Away,
     /// All other operators have finished.
     Gone,
@@ -98,11 +98,11 @@ pub enum Others {
 enum OperatorState {
     #[default]
     Thinking,
-    /// The operator has commanded; the step is not made yet.
+    /// The operator has given its command for the next step, which is not executed yet.
     Waiting(Box<Pending>),
     /// The operator's command is being executed.
     Acting,
-    /// The operator has used up the others' patience; they no longer wait.
+    /// The operator gave no command within the time limit, so the others no longer wait for it.
     Silent,
     /// The operator has called finish.
     Finished,
@@ -128,12 +128,12 @@ impl Round {
         self.operators.iter().map(Operator::memory).collect()
     }
 
-    /// Restores the kept state.
+    /// Restores the state of each operator from `memory`.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
         self.operators.iter_mut().zip(memory).for_each(|(operator, memory)| operator.restore(memory));
     }
 
-    /// Returns true if a player in this process drives, or waits for others.
+    /// Returns true if a partner or a real-time driver has a robot, or if a command waits for execution.
     pub fn is_busy(&self) -> bool {
         let drives = |operator: &Operator| {
             operator.partner.or(operator.left).is_some() || operator.teleoperation.is_some()
@@ -141,8 +141,9 @@ impl Round {
         self.operators.iter().any(drives) || self.may_begin()
     }
 
-    /// Returns true where a command by the operator on `seat` goes on after a shorter one of a partner:
-    /// beside people and programs in real time, partners of this process and plans, whose commands are short.
+    /// Returns true if a command of the operator at `seat` continues after a partner's shorter command ends.
+    /// This is so if the operator is a partner of this process, beside people and programs in real time, and
+    /// during plans.
     pub fn goes_on(&self, seat: usize) -> bool {
         self.operators[seat].partner.is_some()
             || self.plans > 0
@@ -150,13 +151,13 @@ impl Round {
             || self.others(seat).any(|operator| operator.paced)
     }
 
-    /// Returns the actions of the operators other than that of `seat`.
+    /// Returns the current actions of all operators except the one at `seat`.
     pub fn presence(&self, seat: usize) -> Vec<Presence> {
         self.others(seat).map(Operator::presence).collect()
     }
 
-    /// Checks that the operator on `seat` may command now. One that kept silent is refused once, with the
-    /// steps that it missed.
+    /// Checks that the operator at `seat` may command now. An operator whose robot was held is refused once,
+    /// with the steps that it missed.
     pub fn admit(&mut self, seat: usize) -> Result<(), HostingError> {
         let waits_for = self.awaited();
         let operator = &mut self.operators[seat];
@@ -175,7 +176,7 @@ impl Round {
         }
     }
 
-    /// Lets the operator on `seat` leave. Returns true if others play on.
+    /// Marks the operator at `seat` as finished. Returns true if others continue to play.
     pub fn finish(&mut self, seat: usize) -> Result<bool, HostingError> {
         let waits_for = self.awaited();
         let operator = &mut self.operators[seat];
@@ -197,7 +198,7 @@ impl Round {
         thinking.map(|operator| operator.robot.clone()).collect()
     }
 
-    /// Returns the states of the operators other than that of `seat`.
+    /// Returns the state of all operators except the one at `seat`.
     pub fn state_of_others(&self, seat: usize) -> Others {
         let all = |of: fn(&OperatorState) -> bool| self.others(seat).all(|operator| of(&operator.state));
         if all(|state| matches!(state, OperatorState::Finished)) {
@@ -213,7 +214,7 @@ impl Round {
         self.operators.iter().enumerate().filter(move |(other, _)| *other != seat).map(|(_, other)| other)
     }
 
-    /// Returns true if a step can be made: an operator has commanded, and no step is being made.
+    /// Returns true if a step can begin: an operator has commanded, and no step is being executed.
     pub fn may_begin(&self) -> bool {
         let any = |of: fn(&OperatorState) -> bool| self.operators.iter().any(|operator| of(&operator.state));
         any(|state| matches!(state, OperatorState::Waiting(_)))
@@ -225,7 +226,7 @@ impl Round {
         self.patience.is_some()
     }
 
-    /// Starts the patience timer; `patience` stops it.
+    /// Records that the patience timer runs; the handle `patience` stops it.
     pub fn time(&mut self, patience: AbortHandle) {
         self.patience = Some(patience);
     }
@@ -235,7 +236,7 @@ impl Round {
         self.operators.iter_mut().for_each(Operator::fall_silent);
     }
 
-    /// Takes the commands of the step that is made now, by seat.
+    /// Begins a step: stops the patience timer and takes the pending commands with their seats.
     pub fn begin(&mut self) -> Vec<(usize, Pending)> {
         if let Some(patience) = self.patience.take() {
             patience.abort();
@@ -250,7 +251,8 @@ impl Round {
         taken
     }
 
-    /// Ends the step, which has succeeded with `answer` or failed. Returns each robot's outcome, by seat.
+    /// Ends the step, which succeeded with `answer` or failed if that is `None`. Returns each robot's
+    /// outcome, by seat.
     pub fn end(&mut self, answer: Option<&Answer>) -> Vec<PartnerDid> {
         self.number += 1;
         let made = answer.and_then(|answer| match &answer.reply {
@@ -262,7 +264,7 @@ impl Round {
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }
 
-    /// Refuses a message that would exceed `MAX_UNHEARD` for one of its recipients.
+    /// Returns an error if a message would exceed `MAX_UNHEARD` for one of its recipients.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
         match self.others(from).find(|other| other.heard.len() >= MAX_UNHEARD) {
             Some(other) => {
@@ -303,7 +305,7 @@ impl Operator {
         self.clock.add(thought);
         self.left = partner.filter(|_| !finished);
         match self.state {
-            // It has already called again.
+            // The operator has already called again.
             OperatorState::Waiting(_) | OperatorState::Acting => {}
             _ if finished => self.state = OperatorState::Finished,
             _ if silent => self.state = OperatorState::Silent,
@@ -311,7 +313,7 @@ impl Operator {
         }
     }
 
-    /// Counts a request; the first starts its clock.
+    /// Counts a request. The first request starts the operator's clock.
     pub fn arrive(&mut self) {
         self.requests += 1;
         if let OperatorState::Thinking = self.state {
@@ -319,13 +321,13 @@ impl Operator {
         }
     }
 
-    /// Sets the time after each command that counts as pacing.
+    /// Sets the time after each command that is not charged as thinking.
     pub fn set_pace(&mut self, pace: Duration) {
         self.clock.set_pace(pace);
     }
 
-    /// Returns the setpoint of its driver that is a command now, if the last command has been answered and
-    /// time may pass. The flag says whether the driver receives the robot's state.
+    /// Returns the driver's setpoint that becomes a command now, if the last command has been answered and
+    /// time may pass. The flag is true if the driver receives the robot's state.
     pub fn due(&mut self, now: Instant) -> Option<(Setpoint, bool)> {
         let teleoperation = self.teleoperation.as_mut().filter(|_| self.under_way.is_none())?;
         let due = teleoperation.due(now)?;
@@ -333,24 +335,24 @@ impl Operator {
         Some(due)
     }
 
-    /// Returns the requests and the time that it has used up to now.
+    /// Returns the number of requests and the thinking time that the operator has used so far.
     pub fn used(&self) -> OperatorUse {
         let thinking_s = to_ms(self.clock.thought());
         OperatorUse { robot: self.robot.clone(), requests: self.requests, thinking_s }
     }
 
-    /// Returns the time that it has thought.
+    /// Returns the operator's thinking time so far.
     pub fn thought(&self) -> Duration {
         self.clock.thought()
     }
 
-    /// Takes its command for the next step.
+    /// Stores the operator's command for the next step.
     pub fn command(&mut self, pending: Pending) {
         self.state = OperatorState::Waiting(pending.into());
         self.clock.stop();
     }
 
-    /// Records that it has looked at the current state.
+    /// Records that the operator has observed the current state, and so needs no notice of a hold.
     pub fn has_looked(&mut self) {
         self.missed = None;
         if let OperatorState::Silent = self.state {
@@ -359,7 +361,7 @@ impl Operator {
         }
     }
 
-    /// Refuses an operator that has finished.
+    /// Returns an error if the operator has finished.
     pub fn check_plays(&self) -> Result<(), HostingError> {
         match self.state {
             OperatorState::Finished => Err(HostingError::OperatorFinished { robot: self.robot.clone() }),
@@ -370,13 +372,13 @@ impl Operator {
         }
     }
 
-    /// Counts a message that this operator has sent, and returns the number of its earlier messages.
+    /// Counts a message that this operator has sent, and returns the number of messages sent before it.
     pub fn count_said(&mut self) -> u32 {
         self.said += 1;
         self.said - 1
     }
 
-    /// Takes the unread messages.
+    /// Takes the operator's unread messages.
     pub fn take_heard(&mut self) -> Vec<Heard> {
         std::mem::take(&mut self.heard)
     }
@@ -394,7 +396,7 @@ impl Operator {
         Presence { robot: self.robot.clone(), state, thinking_s }
     }
 
-    /// Stops the others from waiting for it until it calls again, if it is thinking.
+    /// Marks the operator as silent if it is thinking. The others do not wait for it until it calls again.
     pub fn fall_silent(&mut self) {
         if let OperatorState::Thinking = self.state {
             self.state = OperatorState::Silent;
@@ -402,7 +404,8 @@ impl Operator {
         }
     }
 
-    /// Ends a step that was made from the first to the second of `made`.
+    /// Ends a step for this operator and returns its outcome. `made` is the first and last control step
+    /// executed; `None` after a failure.
     fn end(&mut self, made: Option<[u32; 2]>) -> PartnerDid {
         match self.state {
             OperatorState::Acting => {
@@ -411,8 +414,7 @@ impl Operator {
                 PartnerDid::Acted
             }
             OperatorState::Finished => PartnerDid::HeldFinished,
-            // It has looked and commanded again while the step was made; the command is for the next
-            // step.
+            // The operator gave this command while the step was being executed, so it is for the next step.
             OperatorState::Waiting(_) => PartnerDid::HeldSilent,
             OperatorState::Thinking | OperatorState::Silent => {
                 if let Some([from_step, to_step]) = made {

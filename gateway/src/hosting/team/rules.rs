@@ -7,7 +7,7 @@ use tandem_episodes::{EpisodeSpec, stress::Silence};
 /// Rules for the operators of an episode.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TeamRules {
-    /// Limit of each operator's thinking time; `None` without one.
+    /// Limit of each operator's thinking time; `None` for no limit.
     pub thinking_limit: Option<Duration>,
     /// Message loss between operators under stress.
     pub silence: Option<Silence>,

@@ -1,4 +1,4 @@
-//! Setpoints of drivers in real time.
+//! Setpoints of real-time drivers.
 
 use std::time::{Duration, Instant};
 
@@ -13,28 +13,28 @@ use crate::hosting::{Answer, HostingError};
 /// Duration of a control step.
 pub const TICK: Duration = Duration::from_millis(20);
 
-/// Silence after which a person counts as away, for example because the page is hidden or the link is
-/// cut.
+/// Time without a request after which a person counts as away, for example because the page is hidden or the
+/// connection is lost.
 pub const AWAY_AFTER: Duration = Duration::from_millis(500);
 
-/// Maximum speed of a wrist's target per control step, however far away the next setpoint is.
+/// Maximum translation and rotation of a wrist's target per control step: 1.5 m/s and 6 rad/s.
 const WRIST_M_PER_STEP: f64 = 1.5 * 0.02;
 const WRIST_RAD_PER_STEP: f64 = 6.0 * 0.02;
 
-/// Setpoint of a robot for one control step.
+/// Setpoint for one robot and one control step.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "one setpoint a robot; wrists are the usual one")]
 pub enum Setpoint {
-    /// Wrists, fingers and base.
+    /// Targets of wrists, fingers and base.
     Wrists(WristMove),
-    /// One row of joint targets and base.
+    /// One row of targets of joints and base.
     Joints(JointChunk),
     /// One row of motors' setpoints.
     Drives(JointDrives),
 }
 
 impl Setpoint {
-    /// Returns the command of one control step.
+    /// Returns the command that executes the setpoint for one control step.
     pub fn call(self) -> ToolCall {
         match self {
             Setpoint::Wrists(entry) => MoveWrists { steps: 1, robots: vec![entry] }.into(),
@@ -48,7 +48,7 @@ impl Setpoint {
 #[derive(Debug, Clone)]
 pub struct DriverRequest {
     pub setpoint: Setpoint,
-    /// True to receive the robot's state with the sensors of every physics step after each command.
+    /// True to receive the robot's state after each command, with the sensor readings of every physics step.
     pub tells_state: bool,
     /// True while time may pass.
     pub go: bool,
@@ -62,24 +62,24 @@ pub type AnswerSender = mpsc::Sender<Result<Answer, HostingError>>;
 /// State of the driver of one robot.
 #[derive(Debug)]
 pub struct Teleoperation {
-    /// Number of the driver among all that the team has had.
+    /// Number of the driver among all drivers that the team has had.
     pub driver: u64,
     pub answers: AnswerSender,
     request: DriverRequest,
     requested: Instant,
-    /// Last setpoint that was commanded.
+    /// Setpoint of the last command.
     last: Setpoint,
 }
 
 impl Teleoperation {
-    /// Begins with a robot that holds still.
+    /// Creates the state of a driver whose first setpoint holds the robot still.
     pub fn new(driver: u64, robot: &str, answers: AnswerSender) -> Teleoperation {
         let hold = Setpoint::Wrists(WristMove::hold(robot));
         let request = DriverRequest { setpoint: hold.clone(), tells_state: false, go: false, steps: 0 };
         Teleoperation { driver, answers, request, requested: Instant::now(), last: hold }
     }
 
-    /// Lets time pass as `request` says.
+    /// Copies `go` from `request` and adds the single steps of `request` to those left.
     pub fn pass_time(&mut self, request: &DriverRequest) {
         self.requested = Instant::now();
         self.request.go = request.go;
@@ -110,7 +110,7 @@ impl Teleoperation {
     }
 }
 
-/// Limits `wanted` to wrist targets within one step's reach of the last ones.
+/// Limits the wrist targets in `wanted` to the displacement from `last` that one control step allows.
 fn within_speed(wanted: &WristMove, last: &WristMove) -> WristMove {
     WristMove {
         left_position_m: nearer(wanted.left_position_m, last.left_position_m),

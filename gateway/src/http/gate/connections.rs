@@ -32,7 +32,7 @@ const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(200);
 /// First byte of a TLS connection: the type of a handshake record.
 const TLS_HANDSHAKE: u8 = 22;
 
-/// Data needed to serve a connection.
+/// Data that is needed to serve a connection.
 #[derive(Clone)]
 struct Serving {
     router: Router,
@@ -162,7 +162,7 @@ impl Serving {
     }
 }
 
-/// A connection, by its first byte.
+/// A new connection, classified by its first byte.
 enum Begun {
     Encrypted(Box<TlsStream<TcpStream>>),
     Plain(TcpStream),

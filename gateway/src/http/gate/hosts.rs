@@ -39,8 +39,8 @@ impl OwnHosts {
 
     /// Returns true if `host`, with or without a port, is a name of this server.
     ///
-    /// Unknown names are refused, because a foreign page could make its own name resolve to this machine.
-    /// An address cannot be redirected, so a server that listens on all addresses accepts each.
+    /// Unknown names are refused, because a foreign page could make its own name resolve to this machine. An
+    /// address cannot be redirected, so a server that listens on all addresses accepts every address.
     fn contains(&self, host: &str) -> bool {
         let Ok(authority) = host.parse::<Authority>() else { return false };
         let name = authority.host().trim_start_matches('[').trim_end_matches(']');

@@ -44,7 +44,7 @@ impl Limits {
 
     fn check_rate(&self, peer: Option<&Peer>) -> Result<(), ApiError> {
         let (Some(rates), Some(Peer(address))) = (&self.rates, peer) else { return Ok(()) };
-        // A panic while the lock was held would leave every allowance valid.
+        // Every allowance stays valid even if a thread panics while it holds the lock.
         let mut rates = rates.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         if rates.take(*address, Instant::now()) {
             return Ok(());
@@ -53,7 +53,7 @@ impl Limits {
     }
 }
 
-/// Admits a request within its address's rate, or answers with the time of the next attempt.
+/// Admits a request within the rate limit of its address, or answers with the time of the next attempt.
 pub async fn pass_rate(State(limits): State<Limits>, request: Request, next: Next) -> Response {
     match limits.check_rate(request.extensions().get()) {
         Ok(()) => next.run(request).await,
@@ -61,8 +61,8 @@ pub async fn pass_rate(State(limits): State<Limits>, request: Request, next: Nex
     }
 }
 
-/// Gives a request one of the places, or answers with the time of the next attempt. The request has
-/// arrived completely and its caller is known, so that a slow client never holds a place.
+/// Admits a request if there is a free slot, or answers with the time of the next attempt. By then the
+/// request is complete and its caller identified, so a slow client never occupies a slot.
 pub async fn take_place(State(limits): State<Limits>, request: Request, next: Next) -> Response {
     let Ok(_place) = limits.permits.try_acquire() else {
         return refused(ApiError::Busy { limit: limits.most_requests });
@@ -78,7 +78,7 @@ fn refused(refusal: ApiError) -> Response {
     refusal.into_response()
 }
 
-/// Request allowance of each address. It grows evenly up to the number of requests of one second.
+/// Request allowance of each address. It refills at a constant rate, up to the requests of one second.
 #[derive(Debug)]
 struct Rates {
     per_second: u32,

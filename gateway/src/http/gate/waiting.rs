@@ -1,7 +1,7 @@
 //! Idle connections: their time limits, and their number per address.
 //!
-//! A language model may think for minutes between two calls. So a connection that has made a good call
-//! may stay idle for an hour. All others have the time limit of a header.
+//! A language model may think for minutes between two calls. So a connection that has made a good call may
+//! stay idle for an hour. All other connections have the time limit of a header.
 
 use std::{
     collections::HashMap,
@@ -45,7 +45,7 @@ struct WaitingEntry {
     crowding: Arc<Crowding>,
 }
 
-/// Tells a connection that it has to close.
+/// Signal to a connection that it must close.
 #[derive(Debug, Default)]
 struct Crowding {
     is_out: AtomicBool,
@@ -92,9 +92,9 @@ impl WaitingConnections {
         }
     }
 
-    /// Adds a connection. A connection that already waits keeps its place, and one that has to close gets no
-    /// place. If its address has too many, the one with the longest wait is closed, preferably one without a
-    /// valid call.
+    /// Adds a connection, unless it has to close. A connection that already waits keeps its position. If too
+    /// many connections of its address wait, the one with the longest wait is closed, preferably one without
+    /// a good call.
     fn add(&self, connection: &Connection) {
         let mut waiting = self.lock();
         if connection.crowding.is_out.load(Ordering::Relaxed) {
@@ -132,7 +132,7 @@ pub struct Connection {
 #[derive(Debug, Clone, Copy)]
 struct RequestWait {
     since: Instant,
-    /// Arrival of the first byte of its header.
+    /// Time at which the first byte of the header was received.
     header_since: Option<Instant>,
 }
 
@@ -142,12 +142,12 @@ impl Connection {
         self.address
     }
 
-    /// Returns once this connection has to close because too many of its address wait.
+    /// Returns once this connection has to close because too many connections of its address wait.
     pub async fn crowded_out(&self) {
         self.crowding.told.notified().await;
     }
 
-    /// Counts the connection as busy, because its request has arrived and is admitted.
+    /// Counts the connection as busy, because its request was received and admitted.
     pub fn is_served(&self) {
         self.all.remove(self);
     }
@@ -172,8 +172,8 @@ impl Connection {
         self.lock().header_since.get_or_insert_with(Instant::now);
     }
 
-    /// Returns the end of the wait. A connection without a good call has one header time limit for wait
-    /// and header together.
+    /// Returns the time at which the wait ends. For a connection without a good call, the header time limit
+    /// covers both the wait and the header.
     fn deadline(&self) -> Instant {
         let RequestWait { since, header_since } = *self.lock();
         match (self.is_trusted(), header_since) {

@@ -25,7 +25,7 @@ impl SplitMix64 {
     }
 }
 
-/// Returns a value that a schema allows, as far as this generator understands the schema.
+/// Returns a value that a schema allows, as far as this generator supports the schema.
 pub fn allowed(schema: &Value, random: &mut SplitMix64) -> Value {
     if let Some(choices) = schema["anyOf"].as_array().filter(|_| schema["type"].is_null()) {
         return allowed(random.of(choices), random);
@@ -141,7 +141,7 @@ pub fn text(random: &mut SplitMix64) -> String {
     (*random.of(&TEXTS)).into()
 }
 
-/// Serializes a body as it may arrive: mostly JSON, sometimes corrupted.
+/// Serializes a body as a server may receive it: mostly JSON, sometimes corrupted.
 pub fn bytes(value: &Value, random: &mut SplitMix64) -> Vec<u8> {
     let mut bytes = value.to_string().into_bytes();
     if random.percent(85) {

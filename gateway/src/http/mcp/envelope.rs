@@ -1,6 +1,6 @@
 //! Validation of the JSON-RPC 2.0 message around a call over MCP, with the error codes of JSON-RPC.
 //!
-//! The MCP library would take some invalid messages for unknown requests, and would answer others without
+//! The MCP library would mistake some invalid messages for unknown requests, and would answer others without
 //! JSON.
 
 use axum::{
@@ -13,7 +13,7 @@ const PARSE_ERROR: i32 = -32700;
 const INVALID_REQUEST: i32 = -32600;
 const INVALID_PARAMS: i32 = -32602;
 
-/// Reason why a body is no JSON-RPC message.
+/// Reason why a body is not a JSON-RPC message.
 #[derive(Debug)]
 pub struct RpcError {
     code: i32,

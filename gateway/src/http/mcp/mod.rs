@@ -43,8 +43,8 @@ use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 /// Accept header that the library requires; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
-/// Returns a host's text for its model about the server as a whole, limited to the calls that `caller` may
-/// make.
+/// Returns the instructions about the server that a host passes to its model, limited to the calls that
+/// `caller` may make.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call start_episode, whose tasks list_tasks names, then look".into(),
@@ -192,8 +192,8 @@ impl ServerHandler for McpServer {
                 result.structured_content = value;
                 result
             }
-            // A refusal is returned as the tool's answer, which the model reads; protocol errors often
-            // stay with the host.
+            // A refusal is returned as the tool's answer, which the model reads. Hosts often do not show
+            // protocol errors to the model.
             Err(error) => CallToolResult::error(refusal_blocks(&error)),
         };
         Ok(result.into())
@@ -201,8 +201,8 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    /// Returns the instructions for `caller`. An operator's contain its part of the task and advice on
-    /// playing with partners, since a model may see no other part of the briefing.
+    /// Returns the instructions for `caller`. An operator's instructions contain its part of the task and
+    /// advice on playing with partners, since a model may see no other part of the briefing.
     async fn instructions(&self, caller: &Caller) -> String {
         let begin = instructions(caller);
         let Caller::Operator { episode, .. } = caller else { return begin };
@@ -288,8 +288,8 @@ impl McpServer {
     }
 }
 
-/// Asks for a short reply, unless the call requests a full one: a model reads the whole reply, and the
-/// instructions say so.
+/// Requests a short reply, unless the call sets `short`, because a model reads the whole reply. The
+/// instructions mention this default.
 fn short_unless_given(mut args: Value) -> Value {
     if let Some(args) = args.as_object_mut() {
         args.entry("short").or_insert(true.into());
@@ -327,8 +327,8 @@ fn remove_images(seen: &mut Value) {
     }
 }
 
-/// Returns true if the client asks for output schemas and structured content, which is the reply once more,
-/// by the query of its URL. A model would read both.
+/// Returns true if the query of the client's URL requests output schemas and structured content. Structured
+/// content repeats the reply, and a model would read both.
 fn wants_structure(context: &RequestContext<RoleServer>) -> bool {
     let query = context.extensions.get::<Parts>().and_then(|parts| parts.uri.query());
     query.into_iter().flat_map(|query| query.split('&')).any(|pair| pair == "output=structured")
@@ -371,7 +371,7 @@ struct DuplicateField(String);
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     accept_whatever_fits(&mut parts);
-    // The gate has received it, within its limit.
+    // The gate has already received the body, within its limit.
     let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
     if parts.method == Method::POST
         && let Err(error) = envelope::check(&bytes)

@@ -29,8 +29,8 @@ pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
     vec![prompt.with_title("Play a task")]
 }
 
-/// Returns the prompt called `name` for the task, seed and protocol in `arguments`, in the form for
-/// `caller`; `list` has the tasks.
+/// Returns the prompt called `name` for `caller`, with the task, seed and protocol in `arguments`. The tasks
+/// are in `list`.
 pub fn prompt(
     name: &str,
     arguments: JsonObject,

@@ -1,5 +1,5 @@
 //! Resources that MCP hosts may read: an episode's briefing, the brief of the server, and pages of the book.
-//! Tools do not repeat the two briefs.
+//! No tool repeats the briefing or the brief.
 
 use std::sync::Arc;
 
@@ -15,7 +15,8 @@ use crate::{
     http::{app::AppState, problem::ApiError},
 };
 
-/// Beginning of the URIs of images to which replies link. The rest is as in their paths.
+/// Beginning of the URIs of images to which replies link. The rest of a URI equals the rest of the image's
+/// path.
 const IMAGES: &str = "tandem://episodes/";
 /// The brief of every episode.
 const BRIEF: &str = "tandem://brief";
@@ -64,7 +65,7 @@ pub fn image(link: &ImageLink) -> Resource {
     Resource::new(uri, name).with_mime_type("image/png")
 }
 
-/// Returns the linked image of this URI; `None` if the URI is no link to an image.
+/// Returns the linked image of this URI, or `None` if the URI is not a link to an image.
 fn read_image(app: &AppState, caller: &Caller, uri: &str) -> Option<Result<ReadResourceResult, ErrorData>> {
     let (id, name) = uri.strip_prefix(IMAGES)?.split_once("/images/")?;
     let png = app.table.hosted(id).and_then(|hosted| hosted.image(caller, name)).map_err(ApiError::from);
@@ -78,7 +79,7 @@ fn read_image(app: &AppState, caller: &Caller, uri: &str) -> Option<Result<ReadR
 /// Reads a resource.
 ///
 /// # Errors
-/// If there is none of this URI for `caller`.
+/// Fails if `caller` may read no resource with this URI.
 pub async fn read(app: &AppState, caller: &Caller, uri: &str) -> Result<ReadResourceResult, ErrorData> {
     if let Some(image) = read_image(app, caller, uri) {
         return image;

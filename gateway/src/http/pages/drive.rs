@@ -35,17 +35,17 @@ pub const ENTER: &str = "/operate/enter";
 /// Prefix of the names of cookies with operators' tokens; the robot's name follows.
 const COOKIE: &str = "tandem_operator_";
 
-/// Interval between two updates of the robots that the page's robot waits for.
+/// Interval between updates of the list of robots for which the page's robot waits.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
-/// Number of answers for its own robot per full report to a page, which makes five reports a second.
+/// Number of answers for the page's own robot per full report, which gives five reports a second.
 const ANSWERS_PER_REPORT: usize = 10;
 
-/// Robots that a request for the socket may drive: each has its operator's token in a cookie.
+/// Robots that a request for the socket may drive. The token of each robot's operator is in a cookie.
 #[derive(Debug, Clone)]
 pub struct DrivenRobots(pub Vec<String>);
 
-/// A message of a page, with one of three setpoints.
+/// A message of a page, with exactly one of three kinds of setpoint.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Word {
@@ -60,14 +60,14 @@ struct Word {
     /// True to receive the robot's state after each of its commands.
     #[serde(default)]
     states: bool,
-    /// True while time may pass.
+    /// True while simulated time may advance.
     go: bool,
-    /// Number of control steps for single stepping.
+    /// Number of control steps to advance, for single stepping.
     #[serde(default)]
     steps: u32,
 }
 
-/// Token of a request for the cookie; the gate removes it from every other request.
+/// Token that a request sends to be set as a cookie. The gate removes the token from all other requests.
 #[derive(Clone)]
 pub struct GivenToken(pub String);
 
@@ -111,8 +111,8 @@ pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
-/// Returns the operator of `robot` that owns the token in its cookie. Browsers send one cookie per robot;
-/// a second is ignored.
+/// Returns the operator of `robot` that owns the token in its cookie. Browsers send one cookie per robot; a
+/// second cookie is ignored.
 async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
     let (_, token) = cookies.iter().find(|(name, _)| name.strip_prefix(COOKIE) == Some(robot))?;
     app.table.operator_anywhere(token).await.filter(|caller| caller.robot() == Some(robot))
@@ -146,7 +146,7 @@ pub async fn drive(
     })
 }
 
-/// Handles the messages of a page until it has gone. An unreadable message ends the connection.
+/// Handles the messages of a page until it disconnects. An unreadable message ends the connection.
 async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Result<()> {
     while let Some(text) = reader.text().await? {
         let Word { wrist_move, row, drive_row, states, go, steps } = serde_json::from_str(&text)?;
@@ -160,7 +160,7 @@ async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Resu
 ///
 /// # Errors
 ///
-/// If there is none or more than one, or it is not what the tool of its kind takes.
+/// Fails if there is no setpoint or more than one, or if the tool of its kind does not accept it.
 fn setpoint(
     robot: &str,
     wrist_move: Option<Map<String, Value>>,
@@ -182,7 +182,7 @@ fn setpoint(
     }
 }
 
-/// The sending side of a page that drives.
+/// Sending side of the connection to a page that drives.
 struct DriversPage {
     robot: String,
     disclosure: Disclosure,
@@ -242,7 +242,7 @@ impl DriversPage {
                 Ok(LiveEvent::Step(newer)) => step = newer,
                 Ok(other) => others.push(other),
                 Err(TryRecvError::Lagged(_)) => {}
-                // The loop above notices a closed channel.
+                // The loop in `tell` notices a closed channel.
                 Err(TryRecvError::Empty | TryRecvError::Closed) => break,
             }
         }
@@ -260,7 +260,7 @@ impl DriversPage {
                 let result = (*result).clone().disclosed(self.disclosure);
                 sender.text(json!({ "kind": "ended", "result": result }).to_string()).await
             }
-            // The page gets the outcome of its own commands like any operator.
+            // The page gets the outcome of its own commands in the answers.
             LiveEvent::Entry(_) | LiveEvent::Phase(_) | LiveEvent::NextPhase(_) => Ok(()),
         }
     }

@@ -27,10 +27,10 @@ use crate::{
 /// Maximum number of listed episodes, newest first.
 const MAX_LISTED: usize = 500;
 
-/// Depth of the search for episodes below the runs folder; an evaluation nests its own in subfolders.
+/// Depth of the search for episodes below the runs folder. An evaluation keeps its episodes in subfolders.
 const DEPTH: usize = 4;
 
-/// Fields of a result that a list has; hundreds of results with all their fields would be megabytes.
+/// Result fields in the list. With all their fields, hundreds of results would take megabytes.
 const LISTED_FIELDS: [&str; 10] =
     ["task", "seed", "protocol", "phases", "success", "ended", "env_steps", "tool_calls", "falls", "usage"];
 
@@ -74,8 +74,8 @@ fn read_object(path: &Path) -> Option<Map<String, Value>> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Returns the name of the policy that played an episode: its evaluation's entry, which is a file beside the
-/// episode's folder, has it. An episode without one may have notes that name models.
+/// Returns the name of the policy that played an episode, from the evaluation's file beside the episode's
+/// folder. Without that file, returns the models in the result's usage, if there are any.
 fn policy_of(folder: &Path, result: &Map<String, Value>) -> Option<String> {
     let entry = read_object(&folder.with_added_extension("json"));
     let named = entry.and_then(|entry| entry.get("policy")?.as_str().map(str::to_owned));
@@ -175,7 +175,7 @@ pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
 mod tests {
     use super::*;
 
-    /// Returns the policies of the list of a folder with one finished episode and these files.
+    /// Lists a folder that has one finished episode with these files, and returns the policies in the list.
     fn listed(result: &Value, entry: Option<&Value>) -> Vec<Value> {
         let runs = tempfile::tempdir().unwrap();
         let folder = runs.path().join("run/episodes/handover.v1-7");

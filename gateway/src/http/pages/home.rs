@@ -1,6 +1,7 @@
-//! `/`: the start page. It shows episodes and tasks, starts episodes, and says how to connect an agent.
+//! `/`: the start page. It shows episodes and tasks, starts episodes, and explains how to connect an agent.
 //!
-//! It consists only of script and style, so it is public. Its data comes by REST, and by the watch link.
+//! It consists only of script and style, so it is public. It gets its data over REST, and with the watch
+//! link.
 
 use axum::{
     Router,
@@ -22,7 +23,7 @@ use crate::{
 
 const SHELL: &str = include_str!("../../../web/home/page.html");
 
-/// Attribute of the page on a server whose clients start episodes.
+/// Attribute of the page on a server whose clients may start episodes.
 const STARTS: &str = " data-starts";
 
 /// Returns the routes of the page, except for `/` itself, which has a version for programs.

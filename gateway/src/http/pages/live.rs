@@ -29,7 +29,7 @@ fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiErro
     Ok(app.table.hosted(&id).map_err(|_| HostingError::UnknownEpisode { id })?.thread)
 }
 
-/// Returns the scene; its header has the calls and phases up to now.
+/// Returns the scene. Its header has the calls and phases so far.
 pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let LiveWatch { view, .. } = thread(&app, &wanted)?.watch().await?;
     app.textures.add(view.scene.textures());

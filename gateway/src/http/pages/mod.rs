@@ -1,5 +1,5 @@
-//! Web pages: `/` is the start page, `/watch` shows running and finished episodes. A page gets its data over
-//! a WebSocket; its script and style are embedded in this binary from `gateway/web`.
+//! Web pages: `/` is the start page, `/watch` shows running and finished episodes. A page gets its data by
+//! HTTP requests and over a WebSocket. Its script and style are embedded in this binary from `gateway/web`.
 
 mod collecting;
 pub mod drive;
@@ -44,7 +44,7 @@ const KEEP_TEXTURE: &str = "private, max-age=31536000, immutable";
 /// Requested episode, robot and moment.
 #[derive(Debug, Deserialize)]
 struct Wanted {
-    /// A held episode by its id; `run` is the folder of a finished one.
+    /// Id of a hosted episode; `run` is the folder of a finished one.
     episode: Option<String>,
     run: Option<String>,
     robot: Option<String>,
@@ -106,7 +106,7 @@ pub fn door(status: StatusCode) -> Response {
     (status, headers, Html(DOOR.replace("NONCE", &nonce))).into_response()
 }
 
-/// Gives the cookie to a request with the key.
+/// Sets the cookie for a request with the key.
 async fn enter(
     State(app): State<AppState>,
     watcher: Option<Extension<Watcher>>,
@@ -168,7 +168,7 @@ async fn texture(
     Ok((headers, file.bytes).into_response())
 }
 
-/// Runs slow work on a thread for blocking work.
+/// Runs slow work on a thread for blocking work, off the threads for requests.
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
 ) -> Result<T, ApiError> {

@@ -1,7 +1,7 @@
 //! `/operate`: a page on which a person starts an episode or drives one robot.
 //!
-//! It consists only of script and style, so it is public. Its data comes by REST with the token of a
-//! robot's operator, and by a socket.
+//! It consists only of script and style, so it is public. It gets its data over REST with the token of a
+//! robot's operator, and over a socket.
 
 use axum::{
     Extension, Json, Router,
@@ -85,8 +85,8 @@ async fn expert(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Lets partners' commands continue over those of the calling operator, which sends one control step after
-/// another in real time.
+/// Lets partners' commands continue while the calling operator's page sends one control step after another in
+/// real time.
 async fn pace(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -95,7 +95,7 @@ async fn pace(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Names the policy that can drive beside people, for the client that starts episodes.
+/// Returns the name of the policy that can drive beside people, for the client that starts episodes.
 async fn known_policy(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,

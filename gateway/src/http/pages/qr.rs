@@ -23,7 +23,7 @@ mod tests {
 
     const LINK: &str = "http://192.168.100.100:18700/operate#collection=1&robot=A&token=0123456789abcdef0123456789abcdef01234567";
 
-    /// Parses the modules of a code in characters; true is dark.
+    /// Parses the modules of a QR code from its characters; true is dark.
     fn modules(text: &str) -> Vec<Vec<bool>> {
         let halves = |line: &str| {
             let upper = line.chars().map(|char| !matches!(char, '█' | '▀')).collect::<Vec<_>>();

@@ -10,14 +10,14 @@ use flate2::read::GzDecoder;
 
 const PACKED: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/page.js.gz"));
 
-/// The script for clients that take no gzip.
+/// The script for clients that do not accept gzip.
 static PLAIN: LazyLock<String> = LazyLock::new(|| {
     let mut text = String::new();
     GzDecoder::new(PACKED).read_to_string(&mut text).expect("the build has packed a text");
     text
 });
 
-/// Returns the script, packed if the client takes that.
+/// Returns the script, compressed if the client accepts gzip.
 pub(super) async fn script(headers: HeaderMap) -> Response {
     const KIND: &str = "text/javascript; charset=utf-8";
     let mut response = if takes_gzip(&headers) {

@@ -28,7 +28,7 @@ use tungstenite::{
 
 use crate::http::problem::ApiError;
 
-/// Time without progress after which a page counts as gone.
+/// Time without progress after which a page counts as disconnected.
 const WRITE_LIMIT: Duration = Duration::from_secs(10);
 
 /// Maximum length of a message from a page in bytes.
@@ -85,13 +85,13 @@ impl PageSender {
 }
 
 impl PageReader {
-    /// Returns when the page has gone; messages before that are ignored.
+    /// Returns when the page has disconnected. Messages before that are ignored.
     pub async fn gone(&mut self) {
         while let Ok(Some(_)) = self.text().await {}
     }
 
-    /// Returns the next text of a page, or `None` once it has gone. Any message but a whole text of
-    /// limited length ends the connection.
+    /// Returns the next text of a page, or `None` once it has disconnected. Any message except a complete
+    /// text of limited length ends the connection.
     pub async fn text(&mut self) -> io::Result<Option<String>> {
         loop {
             if let Some((opcode, bytes)) = self.frame()? {
@@ -102,7 +102,7 @@ impl PageReader {
                     OpCode::Control(Control::Ping) => self.sender.send(Frame::pong(bytes)).await?,
                     OpCode::Control(Control::Pong) => {}
                     OpCode::Control(Control::Close) => {
-                        // The peer that closes first has gone once it has received this.
+                        // The page has closed first, and disconnects when it receives this frame.
                         let _ = self.sender.send(Frame::close(None)).await;
                         return Ok(None);
                     }
@@ -116,7 +116,7 @@ impl PageReader {
         }
     }
 
-    /// Takes a frame out of the received bytes, if a whole one has arrived.
+    /// Removes a frame from the received bytes, if they contain a complete one.
     fn frame(&mut self) -> io::Result<Option<(OpCode, Vec<u8>)>> {
         let mut cursor = Cursor::new(&self.arrived[..]);
         let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(io::Error::other)? else {
@@ -152,7 +152,7 @@ where
         let (half, sender) = split(TokioIo::new(upgraded));
         let sender = PageSender(Arc::new(Mutex::new(sender)));
         let reader = PageReader { half, sender: sender.clone(), arrived: Vec::new() };
-        // A page that has gone is no error.
+        // A page that has disconnected is not an error.
         let _ = serve(PageSocket { sender, reader }).await;
     });
     let headers = [

@@ -1,5 +1,4 @@
-//! "Take over here": people continue a finished episode from one of its moments, as an episode of their
-//! own.
+//! "Take over here": people continue a finished episode from one of its moments, as a separate episode.
 
 use axum::{
     Extension,
@@ -19,7 +18,7 @@ use crate::http::{
     watching::{Host, RECORDING},
 };
 
-/// Time that the others wait for a person who is away: the maximum.
+/// Maximum time that the other robots wait for an absent person.
 const PATIENCE_S: f64 = 600.0;
 
 /// Moment from which to continue.
@@ -33,8 +32,8 @@ struct TakeOver {
 
 /// Starts an episode from a moment of a finished one, with an operator for each robot.
 ///
-/// The episode starts after the last call that was answered by that moment, and the reply is that of any
-/// start. The request needs both the watch link and the right to start episodes.
+/// The episode starts after the last call that was answered by that moment. The reply is the same as for any
+/// other start. The request needs both the watch link and the right to start episodes.
 pub async fn take_over(
     State(app): State<AppState>,
     host: Option<Extension<Host>>,

@@ -39,7 +39,7 @@ pub enum ApiError {
     /// The host of the episodes, or the episode itself, refused.
     #[error("{0}{hint}", hint = hint(.0))]
     Hosting(#[from] HostingError),
-    /// No such route, or not with this method.
+    /// The route does not exist, or not with this method.
     #[error("{method} {path} is not served; have: {}", .have.join(", "))]
     NoRoute {
         /// Requested method.
@@ -95,7 +95,7 @@ pub enum ApiError {
     /// The caller has no watch key.
     #[error("watching wants the link that the server printed when it started; a policy's token does not do")]
     NoWatcher,
-    /// There is no finished episode of that name.
+    /// There is no finished episode with that name.
     #[error("no finished episode {run:?} with that file in the runs folder; GET /watch/episodes lists them")]
     NoRun {
         /// Requested name.
@@ -115,7 +115,7 @@ pub enum ApiError {
          those who do"
     )]
     NoCollection,
-    /// A mark arrived while there is no episode to be marked.
+    /// The request marks an episode, but no episode awaits a mark.
     #[error("no episode is to be marked now; mark it when it has ended")]
     NothingToMark,
     /// The idempotency key is not a text of the right length.
@@ -152,7 +152,7 @@ pub enum ApiError {
          application/msgpack"
     )]
     ContentType(String),
-    /// Too many requests are under way.
+    /// Too many requests are in progress.
     #[error("{limit} requests are under way, which is the most; send it again")]
     Busy {
         /// Maximum number of concurrent requests.
@@ -211,7 +211,7 @@ struct Problem {
 }
 
 impl Problem {
-    /// Creates a problem of HTTP itself, which has no class.
+    /// Creates a problem of HTTP itself, which has no [`RefusalClass`].
     const fn new(kind: &'static str, title: &'static str, status: StatusCode) -> Problem {
         Problem { kind, title, status, retry_after_s: None, internal: false }
     }
@@ -363,7 +363,7 @@ impl ApiError {
     }
 }
 
-/// Response extension of a refusal: the server that plays the episode.
+/// Response extension of a refusal: URL of the server that plays the episode.
 #[derive(Debug, Clone)]
 pub struct Elsewhere(pub String);
 
@@ -444,7 +444,7 @@ mod tests {
         }
     }
 
-    /// MCP uses the body, and REST the response.
+    /// MCP sends the body, and REST the whole response.
     #[test]
     fn our_own_faults_are_logged_once_whatever_the_caller_speaks() {
         let fault = || ApiError::from(HostingError::Thread(io::Error::other("no more threads")));

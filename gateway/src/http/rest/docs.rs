@@ -67,7 +67,8 @@ fn parameter(parameter: &Value) -> String {
     row(&text(&parameter["name"]), &parameter["schema"], parameter, parameter["required"] == true)
 }
 
-/// Renders the fields of an object as a table, each followed by the fields of nested objects.
+/// Renders the fields of an object as a table. The fields of a nested object follow the field that contains
+/// it.
 fn fields(schema: &Value) -> String {
     let schema = described(schema);
     let mut rows = String::new();
@@ -100,13 +101,13 @@ fn row(name: &str, schema: &Value, described: &Value, required: bool) -> String 
     )
 }
 
-/// Returns the schema of a field. For a nullable field it returns the schema of the other values.
+/// Returns the schema of a field. For a nullable field, this is the schema of its other values.
 fn described(schema: &Value) -> &Value {
     let choices = schema["anyOf"].as_array().filter(|_| schema.get("type").is_none());
     choices.into_iter().flatten().find(|choice| choice["type"] != "null").unwrap_or(schema)
 }
 
-/// Returns the type in words.
+/// Returns the type of a schema in words.
 fn kind(schema: &Value) -> String {
     let schema = described(schema);
     let name = |kind: &Value| match (kind.as_str(), &schema["items"]) {

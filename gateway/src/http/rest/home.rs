@@ -1,6 +1,6 @@
 //! `/` for programs: the first requests, as text. Browsers get `pages/home.rs`.
 
-/// Returns the text of a server of `version`.
+/// Returns the text for a server of this `version`.
 pub fn brief(version: &str) -> String {
     format!(
         "Tandem {version}: simulated humanoids that must work together.\n\

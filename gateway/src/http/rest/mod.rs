@@ -1,4 +1,4 @@
-//! REST routes: those under `/v1`, and those about the server itself.
+//! REST routes: the routes under `/v1`, and routes about the server itself.
 
 mod docs;
 mod home;
@@ -31,7 +31,7 @@ use crate::{
 };
 use idempotency::{IdempotencyKey, mark_replayed};
 
-/// Header of answers that are a page for browsers and a text for programs.
+/// Header of responses that are a page for browsers and a text for programs.
 const BY_ACCEPT: (header::HeaderName, &str) = (header::VARY, "accept");
 
 /// Returns every route: path, methods, handlers.
@@ -280,8 +280,8 @@ async fn remove(
     Ok(Json(app.table.remove(&id).await?))
 }
 
-/// Refuses an operator. Requests that concern more than its robot are for the client that started the
-/// episode.
+/// Refuses an operator, because requests that concern more than its robot are reserved for the client that
+/// started the episode.
 fn require_host(caller: &Caller) -> Result<(), HostingError> {
     match caller {
         Caller::Host => Ok(()),

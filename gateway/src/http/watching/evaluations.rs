@@ -1,4 +1,4 @@
-//! Evaluations in the runs folder with their progress; other processes play them.
+//! Evaluations in the runs folder, which other processes play, and their progress.
 
 use std::{
     collections::BTreeMap,
@@ -18,7 +18,7 @@ const DEPTH: usize = 3;
 /// Time without progress after which an evaluation of unknown state counts as stopped.
 const STOPPED_AFTER: Duration = Duration::from_secs(600);
 
-/// Results of the last reading, by folder.
+/// Counts from the last reading of each evaluation, with the time of its last change, by folder.
 #[derive(Debug, Clone, Default)]
 pub struct KnownEvaluations(Arc<Mutex<BTreeMap<PathBuf, (SystemTime, EvaluationCounts)>>>);
 
@@ -34,14 +34,14 @@ struct EvaluationCounts {
     excluded: usize,
 }
 
-/// Progress of an evaluation, as its card shows it.
+/// Progress of an evaluation for its card on the page.
 #[derive(Debug, Serialize)]
 pub struct EvaluationEntry {
-    /// Its folder, relative to the runs folder.
+    /// The evaluation's folder, relative to the runs folder.
     folder: String,
     #[serde(flatten)]
     counts: EvaluationCounts,
-    /// Number of planned episodes; left out if it is not known.
+    /// Number of planned episodes; left out if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     planned: Option<usize>,
     /// Time of the latest episode, in seconds since 1970.
@@ -51,7 +51,7 @@ pub struct EvaluationEntry {
 }
 
 impl KnownEvaluations {
-    /// Lists the evaluations below `runs`, those with the latest changes first.
+    /// Lists the evaluations below `runs`, most recently changed first.
     pub fn list(&self, runs: &Path) -> Vec<EvaluationEntry> {
         let mut folders = Vec::new();
         collect(runs, DEPTH, &mut folders);
@@ -59,7 +59,7 @@ impl KnownEvaluations {
         let mut found: Vec<(SystemTime, EvaluationEntry)> = folders
             .into_iter()
             .filter_map(|folder| {
-                // Every played episode adds a file there.
+                // Every played episode adds a file to this folder.
                 let changed = fs::metadata(folder.join(EPISODES)).and_then(|found| found.modified()).ok()?;
                 let counts = match known.get(&folder) {
                     Some((then, counts)) if *then == changed => counts.clone(),
@@ -104,7 +104,7 @@ fn entry(
 fn is_played(folder: &Path, planned: PlannedEpisodes, played: usize, changed: SystemTime) -> bool {
     match (planned.state, is_being_played(folder)) {
         (Some(RunState::Complete | RunState::Stopped), _) => false,
-        // The process may have ended without recording it.
+        // The process may have ended without recording its end.
         (_, Some(is_played)) => is_played,
         (_, None) => {
             let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);

@@ -1,5 +1,5 @@
-//! State that a server keeps for watchers: their key, their number, the recording that was viewed last,
-//! images on surfaces, and the pictures of tasks.
+//! State that a server keeps for watchers: their key, their maximum number, the recording viewed last, images
+//! on surfaces, and the pictures of tasks.
 
 mod evaluations;
 mod key;

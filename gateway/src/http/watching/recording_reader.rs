@@ -1,4 +1,4 @@
-//! The thread that reads recordings for watchers of finished episodes. It keeps the last one in memory.
+//! The thread that reads recordings for watchers of finished episodes. It keeps the last recording in memory.
 //!
 //! A recording takes tens of megabytes while it is read, and an allocator keeps freed memory for the
 //! thread that had requested it. With many reading threads, each would keep that much.
@@ -51,7 +51,7 @@ impl RecordingReader {
         RecordingReader(jobs)
     }
 
-    /// Runs `work` on the thread when it is its turn, unless the caller has gone by then.
+    /// Runs `work` on the thread when its turn comes, unless the caller has disconnected by then.
     pub async fn read<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut LastOpened) -> Result<T, ApiError> + Send + 'static,
@@ -79,19 +79,20 @@ pub struct OpenedRecording {
 }
 
 impl OpenedRecording {
-    /// Returns the message with which pages draw it; all requests share it.
+    /// Returns the message from which pages draw the episode. All requests share it.
     pub fn message(&self) -> Bytes {
         Bytes::from_owner(self.episode.message())
     }
 }
 
 impl LastOpened {
-    /// Returns the recording in an episode's folder. It is only read if it is another one or has changed.
+    /// Returns the recording in an episode's folder. The file is read only if it is not the last one, or has
+    /// changed.
     pub fn open(&mut self, folder: &Path) -> Result<&OpenedRecording, ApiError> {
         let path = folder.join(RECORDING);
         let changed = fs::metadata(&path).and_then(|file| file.modified());
         let changed = changed.map_err(|_| no_recording(folder))?;
-        // The previous one is dropped first, so that there are never two.
+        // The previous recording is dropped first, so that two are never in memory at once.
         let last = self.0.take().filter(|opened| opened.path == path && opened.changed == changed);
         let opened = match last {
             Some(opened) => opened,

@@ -1,4 +1,4 @@
-//! Images on surfaces of the scenes that pages have seen, by their hashes.
+//! Surface images of the scenes that pages have drawn, by their hashes.
 
 use std::{
     collections::HashMap,
@@ -7,19 +7,19 @@ use std::{
 
 use tandem_episodes::live::LiveTexture;
 
-/// Images of the scenes that are held. They are forgotten with their scenes.
+/// Surface images of the scenes in use. An image is dropped with its scene.
 #[derive(Debug, Clone, Default)]
 pub struct KnownTextures(Arc<Mutex<HashMap<String, Weak<LiveTexture>>>>);
 
 impl KnownTextures {
-    /// Takes in the images of a scene that a page is about to draw.
+    /// Adds the surface images of a scene that a page is about to draw.
     pub fn add(&self, textures: &[Arc<LiveTexture>]) {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         known.retain(|_, texture| texture.strong_count() > 0);
         known.extend(textures.iter().map(|texture| (texture.hash().to_owned(), Arc::downgrade(texture))));
     }
 
-    /// Returns the image with a hash, as long as a scene has it.
+    /// Returns the image with this hash, as long as a scene uses it.
     pub fn find(&self, hash: &str) -> Option<Arc<LiveTexture>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get(hash)?.upgrade()
     }

@@ -19,10 +19,10 @@ use crate::{Delays, Server};
 
 /// Number of kills in a test, with alternating tasks.
 const KILLS: usize = 5;
-/// Maximum time of a kill after the first call.
+/// Maximum delay of a kill after the first call.
 const LATEST_KILL_MS: u64 = 500;
 
-/// A server that is restarted whenever it is gone.
+/// A server that is restarted whenever it has ended.
 struct Restarted<'a> {
     runs: &'a Path,
     server: Mutex<(Server, usize)>,
@@ -43,8 +43,8 @@ impl<'a> Restarted<'a> {
         assert!(Command::new("kill").args(["-KILL", &id]).status().expect("kill").success());
     }
 
-    /// Returns the answer to a call, which is repeated with the same key if the server has gone
-    /// meanwhile.
+    /// Returns the status and the answer of a call. The call is repeated with the same key if the server has
+    /// ended in the meantime.
     fn call(&self, path: &str, token: Option<&str>, key: &str, body: &Value) -> (u16, Value) {
         let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
         loop {
@@ -114,7 +114,7 @@ fn play(task: &str, seed: u64, kill_after: Option<Duration>) -> (Vec<Value>, Vec
             answers.push(server.call(&path, None, &key, &arguments).1);
         }
         if kill_after.is_some() {
-            // The last kill is awaited, so that finish comes after it.
+            // The loop waits for the last kill, so that `finish` comes after it.
             while server.address().1 == 0 {
                 thread::sleep(Duration::from_millis(20));
                 server.call(&format!("/v1/episodes/{id}/tools/get_status"), None, "status", &json!({}));
@@ -154,14 +154,14 @@ fn a_killed_server_goes_on_where_it_stood() {
     kill_and_compare(KILLS, 3100);
 }
 
-/// The documented number of kills.
+/// Runs the number of kills that the documentation states.
 #[test]
 #[ignore = "ten minutes: cargo test --release -p tandem --test processes -- --ignored killed_two_hundred"]
 fn a_server_that_is_killed_two_hundred_times_goes_on_where_it_stood() {
     kill_and_compare(200, 3200);
 }
 
-/// Plays an operator that talks and acts. Returns the messages that it receives.
+/// Plays as an operator that talks and acts. Returns the messages that it receives.
 fn operate(server: &Restarted, id: &str, robot: &str, token: &str, over: &AtomicBool) -> Vec<String> {
     let mut heard = Vec::new();
     let listen = |answer: &Value, heard: &mut Vec<String>| {

@@ -124,7 +124,7 @@ fn two_processes_in_one_folder_tear_nothing() {
     }
 }
 
-/// Two different runs have two default folders, and repetitions of a run on the same build share one.
+/// Two different runs have two default folders. Repetitions of a run on the same build share a folder.
 #[test]
 fn runs_have_folders_of_their_own_without_being_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -138,7 +138,7 @@ fn runs_have_folders_of_their_own_without_being_told() {
     assert!(first.contains("1 to play, in runs/idle-benchmark-"), "{first}");
     assert!(play("idle", "2000").contains("1 kept, 0 to play, in runs/idle-benchmark-"));
     assert!(play("idle", "2001").contains("1 to play, in runs/idle-benchmark-"));
-    // The program makes no call, which does not affect its folder.
+    // The program makes no call, which does not affect the name of its folder.
     assert!(play("exec:true", "2000").contains("1 to play, in runs/exec-true-benchmark-"));
     let names = fs::read_dir(folder.path().join("runs")).expect("runs").map(|entry| entry.expect("a run"));
     let mut names: Vec<String> = names.map(|run| run.file_name().to_string_lossy().into_owned()).collect();

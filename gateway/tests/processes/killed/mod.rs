@@ -1,4 +1,4 @@
-//! Tests of processes that are killed or asked to end in the middle of work, and of those that resume it.
+//! Tests of processes that are killed or asked to end during their work, and of processes that resume it.
 
 mod brought_back;
 mod interrupted;

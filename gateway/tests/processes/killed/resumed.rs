@@ -29,7 +29,7 @@ fn start_and_kill(arguments: &[&str], delays: &mut Delays, most_ms: u64) {
     child.wait().expect("it ends");
 }
 
-/// Returns every complete file below `folder` with its contents.
+/// Returns every complete file below `folder` with its content.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.expect("an entry")) {
@@ -48,8 +48,8 @@ fn below(files: BTreeMap<PathBuf, Vec<u8>>, folder: &Path) -> BTreeMap<PathBuf, 
     files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect()
 }
 
-/// Returns the files that mark episodes as played. Until an episode has one, its folder may be written
-/// again.
+/// Returns the files that mark episodes as played. The folder of an episode without such a file may be
+/// written again.
 fn played(episodes: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let all = files(episodes).into_iter();
     all.filter(|(path, _)| path.parent() == Some(episodes) && path.extension().is_some_and(|e| e == "json"))

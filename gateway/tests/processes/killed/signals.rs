@@ -1,5 +1,6 @@
-//! Tests of signals. After SIGKILL in an episode, answers older than a second are readable on the disk. A
-//! server that SIGTERM ends while an episode starts leaves no partial file. Under `nohup`, it outlives SIGHUP.
+//! Tests of signals. After SIGKILL in an episode, answers older than a second can be read from the disk. A
+//! server that SIGTERM ends while an episode starts leaves no partial file. Under `nohup`, it outlives
+//! SIGHUP.
 
 use std::{
     path::Path,
@@ -28,7 +29,7 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
         let said = String::from_utf8_lossy(&recovered.stdout).into_owned();
         assert!(recovered.status.success(), "{recovered:?}");
         let whole = partial.with_extension("");
-        // A kill during a write leaves a part of a chunk, which is left out.
+        // A kill during a write leaves an incomplete chunk, which recovery leaves out.
         let bytes = std::fs::read(&whole).expect("the recovered file");
         let messages = MessageStream::new(&bytes).expect("MCAP").filter(Result::is_ok).count();
         assert!(said.contains(&format!("{messages} messages")), "{said}, not {messages}");
@@ -47,7 +48,7 @@ fn what_was_noted_outlives_the_server() {
     let start = json!({ "task": "handover", "seed": 0, "protocol": "agentic" });
     let started = server.post("/v1/episodes", &start).expect("an episode");
     let id = started["episode_id"].as_str().expect("an id");
-    // A note is answered without a body.
+    // The answer to a note has no body.
     assert_eq!(server.post(&format!("/v1/episodes/{id}/notes"), &json!({ "text": "I wait first." })), None);
     server.tool(id, "wait", &json!({ "steps": 5 }));
     server.tool(id, "wait", &json!({ "steps": "many" }));
@@ -69,8 +70,8 @@ fn what_was_noted_outlives_the_server() {
     assert_eq!((note.text.as_str(), call.counted, call.ok), ("I wait first.", false, false));
 }
 
-/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that
-/// answers had reported a second before.
+/// Plays until the server is killed, `delay` after the episode began. Returns the number of control steps
+/// that answers had reported a second before the kill.
 fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
     let server = Server::start(runs);
     let start = json!({ "task": "handover", "seed": seed, "protocol": "agentic" });

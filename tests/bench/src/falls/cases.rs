@@ -20,11 +20,11 @@ pub struct FallCase {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FallPlace {
-    /// The world of a task, over the whole budget of its episodes.
+    /// The world of a task, over the whole step budget of its episodes.
     Task,
-    /// The world of a task, with its first robot dropped on one of its objects and the object's support.
+    /// The world of a task, with the first robot dropped on an object and the object's support.
     TaskFromAbove,
-    /// A robot alone on a floor, without balance control.
+    /// A single robot on an empty floor, without balance control.
     Floor,
     /// A robot dropped on another.
     OnRobot,
@@ -44,7 +44,7 @@ const fn case(name: &'static str, place: FallPlace, stagger: Stagger) -> FallCas
 
 const HALF: Stagger = Stagger { amplitude_share: 0.5, hold_steps: 10, pace_rad_s: 3.0 };
 const SLIGHT: Stagger = Stagger { amplitude_share: 0.1, hold_steps: 10, pace_rad_s: 1.5 };
-/// Targets that jump, as a caller's may.
+/// Targets that jump, like the targets that a caller may send.
 const JUMPING: Stagger = Stagger { amplitude_share: 1.0, hold_steps: 10, pace_rad_s: f32::INFINITY };
 
 pub const FALL_CASES: [FallCase; 15] = [
@@ -65,7 +65,7 @@ pub const FALL_CASES: [FallCase; 15] = [
     case("door_on_hand", FallPlace::Door, SLIGHT),
 ];
 
-/// Number of control steps of cases without a task's budget: falling things are at rest by then.
+/// Number of control steps of cases without a task's step budget. Falling bodies are at rest by then.
 const SHORT_STEPS: u32 = 300;
 const DROP_M: f32 = 1.0;
 /// Height of a robot's head.
@@ -78,13 +78,13 @@ const AIM_M: f32 = 0.2;
 const DRAWS: usize = 1000;
 const HIGHER_M: f32 = 0.05;
 
-/// Position of a robot before the doorway, whose right arm reaches through it, close to the latch post.
+/// Position of a robot in front of the doorway. Its right arm reaches through it, close to the latch post.
 const AT_DOOR_M: [f32; 2] = [-0.28, -0.25];
 const REACHING_RAD: [f32; ARM_JOINTS] = [-0.35, -0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const HINGE: &str = "hinge";
 const OPEN_RAD: f64 = 1.2;
-/// Time at which the door is released, and its push: at its edge, at the height of the hand, as by a
-/// person in a hurry.
+/// Time at which the door is slammed, its initial speed, and the force at the point `EDGE_M` on its edge at
+/// the height of the hand. A person in a hurry pushes a door like this.
 const SHUTS_AFTER_S: f32 = 1.5;
 const SLAM_RAD_S: f64 = 3.0;
 const SHUTTING_N: f32 = 40.0;
@@ -115,8 +115,8 @@ impl FallCase {
         World::new(&WorldSpec { scene: "floor".into(), robots, objects })
     }
 
-    /// Plays one seed in `world`, that of a task or [`FallCase::world`]; `budget_steps` is the number of
-    /// control steps of a task's episode.
+    /// Plays one seed in `world`, which is a task's world or [`FallCase::world`]. `budget_steps` is the
+    /// number of control steps of a task's episode.
     pub fn play(&self, world: &mut World, budget_steps: u32, seed: u64) -> FallTrial {
         let mut random = SplitMix64(seed ^ 0x5eed);
         match self.place {
@@ -161,13 +161,13 @@ impl FallCase {
                 let (sine, cosine) = (angle_rad as f32).sin_cos();
                 world.push_object(HINGE, EDGE_M, Vector::new(-cosine, -sine, 0.0) * SHUTTING_N);
             }
-            // It stands at the door until it is struck; its arm motion is drawn.
+            // The robot stands at the door until the door strikes it, with random arm motion.
             vec![RobotCommand { base: rest.base, ..robot.next(step) }]
         })
     }
 }
 
-/// Puts the first robot above one of the objects and the object's support, at a pose without overlap.
+/// Places the first robot above a random object and its support, in a pose without overlap.
 fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
     let objects = world.present().objects;
     for draw in 0..DRAWS {
@@ -182,7 +182,7 @@ fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
     panic!("the robot overlaps with something wherever it is put, up to {} m", HIGHER_M * DRAWS as f32);
 }
 
-/// Returns a pose on the front, the back or a side, near `at_m`.
+/// Returns the pose of a robot lying on its front, back or side, near `at_m`.
 fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
     let mut by_m = || random.uniform([-AIM_M, AIM_M]);
     let at_m = at_m + Vector::new(by_m(), by_m(), 0.0);
@@ -195,8 +195,7 @@ fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
 mod tests {
     use super::*;
 
-    /// The door strikes the arm in the doorway, and drives the robot, which would stand otherwise, back
-    /// from its place.
+    /// The door strikes the arm in the doorway, and pushes back the robot, which would otherwise stand still.
     #[test]
     fn the_door_strikes_the_robot_before_it() {
         let case = FALL_CASES.iter().find(|case| case.name == "door_on_hand").expect("a case");
@@ -209,7 +208,7 @@ mod tests {
         }
     }
 
-    /// Dropped tables must meet a robot. Otherwise the case would have no effect.
+    /// Dropped tables must hit a robot. Otherwise the case would have no effect.
     #[test]
     fn tables_meet_robots() {
         let case = FALL_CASES.iter().find(|case| case.name == "table_on_robot").expect("a case");

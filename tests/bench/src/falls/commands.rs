@@ -8,15 +8,16 @@ use tandem_sim::{BaseCommand, BaseLimits, CONTROL_DT_S, RobotCommand, RobotModel
 /// Parameters of a robot's staggering.
 #[derive(Clone, Copy, Debug)]
 pub struct Stagger {
-    /// Amplitude of a joint's target, as a share of the way from rest to a random position in its range.
+    /// Amplitude of a joint's target, as a share of the distance from its rest angle to a random angle in its
+    /// range.
     pub amplitude_share: f32,
     /// Number of control steps after which all targets are drawn anew.
     pub hold_steps: u32,
-    /// Speed of the targets.
+    /// Speed at which the targets move.
     pub pace_rad_s: f32,
 }
 
-/// Maximum drawn base velocities, before they are clamped to the controller's limits.
+/// Maximum base velocities drawn, before they are clamped to the controller's limits.
 const FASTEST_BASE_M_S: f32 = 0.5;
 const FASTEST_TURN_RAD_S: f32 = 0.5;
 
@@ -47,7 +48,7 @@ impl Staggering {
         }
     }
 
-    /// Staggers about other joint positions than those of the rest pose.
+    /// Sets joint angles to stagger about, instead of the rest pose.
     pub fn about(&mut self, rest_rad: [f32; UPPER_JOINTS]) {
         self.rest_rad = rest_rad;
     }

@@ -1,6 +1,5 @@
-//! A robot alone on a floor without balance control: all joints, legs included, follow random position
-//! targets. The same commands can be sent to the robot in another simulator, as
-//! `tests/peers/simulation/falls.py` does in MuJoCo.
+//! A single robot on a floor without balance control: all joints, including the legs, follow random position
+//! targets. `tests/peers/simulation/falls.py` sends the same commands to the robot in MuJoCo.
 
 use std::sync::Arc;
 
@@ -15,14 +14,14 @@ use tandem_sim::{
 use super::commands::Stagger;
 use super::{FallTrial, play};
 
-/// Commands of a robot alone on a floor.
+/// Commands of a single robot on a floor.
 #[derive(Clone, Debug, Serialize)]
 pub struct FloorEpisode {
     pub seed: u64,
     pub amplitude_share: f32,
     pub hold_steps: u32,
-    /// Joint targets at the end of each control step, in published order. Within the step they move
-    /// there linearly, and the drives' dampers receive that speed as feedforward.
+    /// Joint targets at the end of each control step, in published order. Within a step, targets are
+    /// interpolated linearly, and the drives' dampers receive the target speed as feedforward.
     pub targets_rad: Vec<Vec<f32>>,
 }
 
@@ -75,7 +74,7 @@ pub(super) fn thrash(world: &mut World, how: Stagger, steps: u32, seed: u64) -> 
     FallTrial { floor: Some(episode), ..trial }
 }
 
-/// Legs that follow targets and do not balance.
+/// Base controller whose legs follow targets and do not balance.
 struct ScriptedLegs {
     limits: BaseLimits,
     model: Arc<RobotModel>,

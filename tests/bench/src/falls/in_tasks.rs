@@ -7,15 +7,15 @@ use super::{FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport};
 use crate::error::BenchError;
 use crate::seeds::{is_asked, over_seeds};
 
-/// First seed; no table of results reports the seeds from here on.
+/// First seed. No table of results uses this seed or a later one.
 const FIRST_SEED: u32 = 2000;
 
-/// Plays `episodes` episodes, spread evenly over the cases whose names contain one of the words of
-/// `filter`, separated by commas. Calls `done` after each case.
+/// Plays `episodes` episodes, spread evenly over the cases whose names contain one of the comma-separated
+/// words of `filter`. Calls `done` after each case.
 ///
 /// # Errors
 ///
-/// If no case matches `filter`, or a world cannot be built.
+/// Returns an error if no case matches `filter`, or a world cannot be built.
 pub fn falls(
     episodes: usize,
     filter: &str,
@@ -47,8 +47,8 @@ pub fn falls(
     Ok(report)
 }
 
-/// Plays one episode of a case. Those in the worlds of tasks go through all tasks, each case from another
-/// one on.
+/// Plays one episode of a case. Cases in the worlds of tasks cycle through all tasks, each case from a
+/// different first task.
 fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchError> {
     let episode = seed - FIRST_SEED;
     let (mut world, budget_steps, place) = match case.place {
@@ -77,8 +77,8 @@ mod tests {
         assert!(refusal(0, "door").contains("at least 1"));
     }
 
-    /// Four episodes of every case, those in tasks over whole budgets. `tandem bench falls --episodes 1000`
-    /// plays more.
+    /// Plays four episodes of every case; episodes in tasks use the whole step budget. `tandem bench falls
+    /// --episodes 1000` plays more.
     #[test]
     fn falls_stay_finite_slow_shallow_and_make_no_energy() {
         let report = falls(60, "", |case| println!("{case}")).expect("worlds");
@@ -90,10 +90,10 @@ mod tests {
         }
     }
 
-    /// In the first episode, the solver did work, 25.8 J of 190 J, because its sweeps had not settled. In the
-    /// next three, a crushed finger left its range by up to 0.46 rad. In the last, waist and shoulder swing
-    /// an arm that whips wrist and finger to two and three times the speeds of their motors. The tip reached
-    /// 26.8 m/s when motors braked with no more than their pushing force.
+    /// Regression test. In the first episode, the solver added 25.8 J to 190 J, because its sweeps had not
+    /// converged. In the next three, a crushed finger left its range by up to 0.46 rad. In the last, waist
+    /// and shoulder swing an arm, which accelerates wrist and finger to two and three times the speed limits
+    /// of their motors. The tip reached 26.8 m/s when motors braked with no more than their driving torque.
     #[test]
     fn hard_falls_keep_to_the_limits() {
         let hard = [

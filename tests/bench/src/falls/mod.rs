@@ -1,5 +1,5 @@
-//! Falls: robots that stagger, are dropped or are struck, and the resulting physics. This is not part of
-//! an episode: a bench puts robots in the air and pushes doors.
+//! Falls: physics of robots that stagger, are dropped or are struck. Unlike an episode, the bench places
+//! robots in the air and pushes doors.
 
 mod cases;
 mod commands;
@@ -25,10 +25,10 @@ pub struct FallTrial {
     pub control_steps: u32,
     /// Number of fallen robots at the end.
     pub fallen: usize,
-    /// Place where physics computed numbers that are not finite, if any.
+    /// Place where physics computed a number that is not finite; `None` if there was none.
     pub diverged: Option<String>,
     pub extremes: Extremes,
-    /// Commands of a robot alone on a floor.
+    /// Commands of a single robot on a floor.
     #[serde(skip)]
     pub floor: Option<FloorEpisode>,
 }
@@ -48,7 +48,7 @@ pub struct FallsCase {
     pub greatest: Extremes,
 }
 
-/// Number of episodes that exceeded each limit, see [`tandem_sim::world::Extremes`].
+/// Number of episodes that exceeded each limit; see [`tandem_sim::world::Extremes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Broken {
     pub speed: usize,
@@ -57,16 +57,16 @@ pub struct Broken {
     pub range: usize,
 }
 
-/// All cases.
+/// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct FallsReport {
     pub cases: Vec<FallsCase>,
-    /// Trials of robots alone on a floor, with their commands.
+    /// Trials of single robots on a floor, with their commands.
     #[serde(skip)]
     pub floor: Vec<(FallTrial, FloorEpisode)>,
 }
 
-/// Plays `steps` control steps; `next` gives the robots' commands for each, and may disturb the world.
+/// Plays `steps` control steps. `next` returns the robots' commands for each step, and may disturb the world.
 fn play(
     world: &mut World,
     steps: u32,
@@ -121,7 +121,8 @@ impl FallsCase {
         }
     }
 
-    /// Column heads of its lines: greatest values, and in brackets the number of episodes beyond the limit.
+    /// Header of the table of cases: greatest values, with the number of episodes beyond the limit in
+    /// brackets.
     pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range  fastest joint";
 }
 

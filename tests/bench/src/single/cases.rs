@@ -21,14 +21,15 @@ pub struct Case {
 #[derive(Clone)]
 pub(super) enum Plan {
     Hold,
-    /// A velocity command; the last [`STOP_S`] seconds are a stop.
+    /// A velocity command, followed by a stop in the last [`STOP_S`] seconds.
     Move(BaseVelocity),
-    /// Down and up again, a third of the time each.
+    /// Squat down, then back up, each in a third of the time.
     Squat {
         high_m: f32,
         low_m: f32,
     },
-    /// A motion from standing to standing: a velocity along one axis for a while, both drawn by the seed.
+    /// A motion from rest to rest: a velocity along one axis for a limited time. The seed selects speed and
+    /// duration.
     Pulse(PulseAxis),
     Tour(Tour),
 }
@@ -46,7 +47,7 @@ pub(super) enum PulseAxis {
 const PULSE_SPEEDS: [f32; 10] = [0.03, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.3, 0.3, -0.2];
 const PULSE_S: [f32; 4] = [0.5, 1.0, 2.0, 3.0];
 
-/// Returns the velocity of a seed's pulse, and its duration.
+/// Returns the velocity and the duration (s) of a seed's pulse.
 pub(super) fn pulse(axis: PulseAxis, seed: u32, scale: &BodyScale) -> (BaseVelocity, f32) {
     let speed = PULSE_SPEEDS[seed as usize % PULSE_SPEEDS.len()];
     let duration_s = PULSE_S[(seed as usize + seed as usize / PULSE_SPEEDS.len()) % PULSE_S.len()];
@@ -63,24 +64,24 @@ pub(super) fn pulse(axis: PulseAxis, seed: u32, scale: &BodyScale) -> (BaseVeloc
 #[derive(Clone)]
 pub(super) enum Disturbance {
     None,
-    /// A steady force on each hand, in a direction that the seed draws.
+    /// A steady force on each hand, in a direction drawn from the seed.
     Pull {
         force_n: f32,
     },
-    /// A level force on each of these hands, in the direction of the seed (ten of them), until `end_s`.
+    /// A horizontal force on each of these hands until `end_s`. The seed selects one of ten directions.
     LevelPull {
         force_n: f32,
         hands: PulledHands,
         end_s: f32,
     },
-    /// One second at the torso, in the direction of the seed (eight of them).
+    /// A force on the torso for one second. The seed selects one of eight directions.
     Push {
         force_n: f32,
     },
 }
 
 impl Case {
-    /// Scales the case to a robot of another size: speeds and heights, loads and forces.
+    /// Scales the case's speeds, heights, loads and forces to a robot of another size.
     pub(super) fn of_size(&self, scale: &BodyScale) -> Case {
         let plan = match self.plan.clone() {
             Plan::Hold => Plan::Hold,
@@ -112,7 +113,7 @@ impl Case {
 #[derive(Clone, Copy)]
 pub(super) enum PulledHands {
     Both,
-    /// The left one for even seeds, the right one for odd ones.
+    /// The left hand for even seeds, the right hand for odd seeds.
     One,
 }
 
@@ -132,15 +133,16 @@ const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) 
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
-/// Rise time of pulls at hands, as when fingers close on a load. Let f be the force at both hands together at
-/// the height z, m g the weight, and a the reach of the feet ahead of their middle. The centre of mass then
-/// has to lean by  f z / (m g) - a  against a steady pull. A sudden pull leaves no time for that. With the
-/// pressure at the toes the centre of mass still follows the pull, by c'' = (g / h) (c + f z / (m g) - a)
-/// from the first instant. At 2 x 25 N f z / (m g) is 15 cm, and soles of 17 cm have a = 8.5 cm.
+/// Rise time of pulls at the hands, similar to fingers that close on a load. Let f be the total force on both
+/// hands at the height z, m g the robot's weight, and a the distance from the middle of the feet to the toes.
+/// Against a steady pull, the centre of mass has to lean by f z / (m g) - a. A sudden pull leaves no time for
+/// that: even with the centre of pressure at the toes, the centre of mass accelerates along the pull, c'' =
+/// (g / h) (c + f z / (m g) - a), from the first instant. At 2 x 25 N, f z / (m g) is 15 cm; soles of 17 cm
+/// have a = 8.5 cm.
 pub(super) const PULL_RISE_S: f32 = 1.0;
 
-/// End times of pulls at the hands of a standing robot. A long pull lasts to the end of the case, which
-/// measures the pulled robot. A short one ends earlier, so that the recovery is measured.
+/// End times of pulls at the hands of a standing robot. A long pull lasts to the end of the case and measures
+/// the robot under load. A short pull ends earlier, so that the recovery is measured.
 const LONG_PULL_END_S: f32 = 20.0;
 const SHORT_PULL_END_S: f32 = 7.0;
 

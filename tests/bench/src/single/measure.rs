@@ -7,17 +7,17 @@ use super::cases::{Case, Plan, STOP_S, pulse};
 use super::tour::Leg;
 use crate::report::CaseFigures;
 
-/// Time before commands and measurements begin, in which arms rise and loads swing out.
+/// Time before commands and measurements begin, in which the arms rise and swinging loads settle.
 pub(super) const SETTLE_S: f32 = 2.0;
 /// Time after the start of motion before a velocity is measured.
 const RAMP_S: f32 = 2.0;
-/// Height above its start at which a foot is in the air.
+/// Height above its initial position from which a foot counts as lifted.
 const LIFTED_M: f32 = 0.015;
 
 /// One control step of the log.
 pub(super) struct Sample {
     pub pelvis_m: Vector,
-    /// Angle between its vertical axis and the world's.
+    /// Angle between the pelvis's vertical axis and the world's.
     pub pelvis_tilt_rad: f32,
     /// Positions of the ankle roll links.
     pub feet_m: Sides<Vector>,
@@ -84,7 +84,7 @@ pub(super) fn measure(
     }
 }
 
-/// Returns the largest distance of a pelvis from its commanded height at the ends of a squat's thirds.
+/// Returns the largest error of the pelvis height at the ends of a squat's thirds.
 fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32> {
     let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
     let error_m = |end_s: &f32| {
@@ -94,11 +94,11 @@ fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32>
     ends.iter().map(error_m).reduce(f32::max)
 }
 
-/// Tolerated share of a pulse's displacement and turn.
+/// Tolerated error, as a share of a pulse's displacement and turn.
 const PULSE_SHARE: f32 = 0.1;
 
-/// Returns the position and heading error of a robot at rest after a pulse: the parts beyond
-/// [`PULSE_SHARE`] of the displacement and of the turn.
+/// Returns the position and heading error of a robot at rest after a pulse, each reduced by [`PULSE_SHARE`]
+/// of the displacement or turn.
 fn off_pulse(from: &Sample, to: &Sample, velocity: BaseVelocity, pulse_s: f32) -> [f32; 2] {
     let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
     let way_m = Vector::new(vx_m_s, vy_m_s, 0.0) * pulse_s;
@@ -117,7 +117,7 @@ fn steps(log: &[Sample]) -> u32 {
     Side::BOTH.into_iter().map(|side| lifts(side) as u32).sum()
 }
 
-/// Returns the deviation of the mean pelvis height over a walk from the commanded one.
+/// Returns the deviation of the mean pelvis height during a walk from the commanded height.
 fn walking_height_error_m(log: &[Sample]) -> f32 {
     let error_m = |sample: &Sample| sample.pelvis_m.z - sample.command.pelvis_height_m;
     (log.iter().map(error_m).sum::<f32>() / log.len() as f32).abs()
@@ -144,7 +144,7 @@ fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
     linear.max(angular)
 }
 
-/// Returns the time until the pelvis stays slower than a limit, averaged over a fifth of a second.
+/// Returns the time after which the pelvis speed, averaged over 0.2 s, stays below a limit.
 fn slower_after_s(log: &[Sample], limit_m_s: f32) -> f32 {
     const WINDOW: usize = 10;
     let speed_m_s =

@@ -18,14 +18,14 @@ use cases::{CASES, Case};
 /// Controller under test.
 #[derive(Clone, Copy, Debug)]
 pub enum Subject<'a> {
-    /// A base controller, under the arms' own drives.
+    /// A base controller; the arms use their standard drives.
     Base(&'a LocomotionChoice),
     /// A policy that drives all motors, without a base controller.
     Motors(&'a LocomotionChoice),
 }
 
 impl Subject<'_> {
-    /// Returns the name in reports; `motors:` marks a policy that drives all motors.
+    /// Returns the name in reports. The prefix `motors:` marks a policy that drives all motors.
     fn name(&self) -> String {
         match self {
             Subject::Base(choice) => choice.name(),
@@ -34,9 +34,9 @@ impl Subject<'_> {
     }
 }
 
-/// Runs every case that matches `filter`, on these seeds, with a robot named `robot` in the results.
-/// `done` is called after each case. Speeds, heights, loads and forces of the cases are those of a G1; a
-/// robot of another size has scaled ones.
+/// Runs every case that matches `filter` on these seeds, with a robot named `robot` in the results. Calls
+/// `done` after each case. The cases specify speeds, heights, loads and forces for a G1; they are scaled for
+/// a robot of another size.
 ///
 /// # Errors
 ///
@@ -61,7 +61,7 @@ pub fn run(
     Ok(LocomotionReport { robot: robot.into(), controller: subject.name(), sensing, cases })
 }
 
-/// Summarises the trials of a case, of which those that fell are `None`.
+/// Summarises the trials of a case. A trial is `None` if the robot fell.
 fn summarise(case: &Case, trials: &[Option<CaseFigures>]) -> CaseReport {
     let standing: Vec<&CaseFigures> = trials.iter().flatten().collect();
     let worst = |value: fn(&CaseFigures) -> Option<f32>| {

@@ -8,19 +8,20 @@ use tandem_sim::{Sides, SplitMix64};
 
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Arms {
-    /// Held out with a little random motion.
+    /// Held out, with small random motion.
     Forward,
-    /// Held out as `Forward`, with every joint swinging widely.
+    /// Held out like `Forward`, with wide swings of every joint.
     Waving,
-    /// Held out as `Forward`, with fingers and thumbs that close from [`CLOSES_AT_S`] on.
+    /// Held out like `Forward`, with fingers and thumbs that close from [`CLOSES_AT_S`] on.
     Closing,
 }
 
-/// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
+/// Angles of the left arm (shoulder pitch, roll and yaw, elbow, wrist) that hold the hand a forearm's length
+/// ahead of the chest.
 const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const RAISE_S: f32 = 1.5;
-/// Start of closing. Fists press on themselves like on a load, because their targets are beyond the range of
-/// their joints.
+/// Time at which hands begin to close. Fists press on themselves as on a load, because the targets are beyond
+/// the joint ranges.
 const CLOSES_AT_S: f32 = 4.0;
 const CLOSING_S: f32 = 0.3;
 const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3];
@@ -28,13 +29,13 @@ const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3
 /// Joint targets over time.
 pub(super) struct ArmMotion {
     waves: Sides<[Wave; ARM_JOINTS]>,
-    /// True if the arms are held out. An arm that lacks joints is held as at rest, since the same angles
-    /// would take it elsewhere.
+    /// True if the arms are held out. An arm that lacks joints keeps its rest pose, since the same angles
+    /// would move its hand elsewhere.
     held_out: bool,
     closes: bool,
 }
 
-/// The swing of one joint.
+/// Sinusoidal swing of one joint.
 #[derive(Clone, Copy)]
 struct Wave {
     amplitude_rad: f32,

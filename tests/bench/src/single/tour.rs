@@ -1,5 +1,5 @@
-//! The tour: waypoints in a square, reached one after the other under punches. Another case is one side of
-//! the square, under a hard punch.
+//! Tours: a robot walks to random waypoints in a square, one after the other, and receives a punch on each
+//! leg. A shorter case is a single leg with a hard punch.
 
 use tandem_sim::{BaseCommand, BaseLimits, SplitMix64, Vector};
 
@@ -9,7 +9,7 @@ pub(super) struct Tour {
     pub waypoints: usize,
     pub half_side_m: f32,
     pub leg_s: f32,
-    /// Time on a leg, force and duration of a punch.
+    /// Ranges of the time of a punch since the start of its leg, and of its force; `punch_s` is its duration.
     pub punch_at_s: [f32; 2],
     pub punch_n: [f32; 2],
     pub punch_s: f32,
@@ -24,12 +24,13 @@ impl Tour {
         punch_n: [0.0, 300.0],
         punch_s: 0.08,
     };
-    /// One hard punch: in the same time, more than twice as many falls as in a tour.
+    /// Tour of one leg with one hard punch. In the same simulated time it causes more than twice as many
+    /// falls as the standard tour.
     pub(super) const LEG: Tour =
         Tour { waypoints: 1, leg_s: 6.0, punch_at_s: [1.5, 3.5], punch_n: [200.0, 300.0], ..Tour::STANDARD };
 }
 
-/// Links that get punched.
+/// Links that receive punches.
 const BODIES: [&str; 6] = [
     "pelvis",
     "torso_link",
@@ -74,8 +75,8 @@ pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
         .collect()
 }
 
-/// Returns the command that walks straight to the target without turning, and stands once it is closer than
-/// [`NEAR_M`].
+/// Returns the command to walk straight to the target without turning, or to stand once the target is closer
+/// than [`NEAR_M`].
 pub(super) fn command(
     away_m: Vector,
     heading_rad: f32,

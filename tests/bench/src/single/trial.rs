@@ -1,4 +1,4 @@
-//! One case with one seed.
+//! A trial: one case with one seed.
 
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use super::tour::{self, Leg};
 use crate::report::CaseFigures;
 
 const PUSH_S: f32 = 1.0;
-/// Start of pulls at a standing robot: its arms are held out by then.
+/// Start of pulls at a standing robot, whose arms are held out by then.
 const PULLS_AT_S: f32 = 4.0;
 
-/// Runs until the time is up; `None` if the robot falls.
+/// Runs the case for its whole duration. Returns `None` if the robot falls.
 pub(super) fn run(
     case: &Case,
     seed: u32,
@@ -157,7 +157,7 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
     }
 }
 
-/// Pushes the link with this name in the embedded robot's file, during the next control step.
+/// Pushes the link that has this name in the embedded robot's file during the next control step.
 fn push_published(world: &mut World, name: &str, point_in_link_m: Vector, force_n: Vector) {
     let model = &world.robots()[0].model;
     let link = &model.links[model.published_link(name).unwrap_or_default()];
@@ -175,7 +175,7 @@ fn pull(world: &mut World, sides: &[Side], force_n: Vector) {
     }
 }
 
-/// Returns a random direction, at most 45 degrees out of the horizontal.
+/// Returns a random direction at most 45 degrees above or below the horizontal.
 fn pull_direction(random: &mut SplitMix64) -> Vector {
     let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
     Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())

@@ -1,7 +1,7 @@
-//! Two robots that carry a bar between them: cases of the bench of base controllers that need hands.
+//! Cases of the bench of base controllers in which two robots carry a bar between them. They require hands.
 //!
-//! They take the bar from its stand with the skills of the experts, lift it, and walk it along the case's
-//! way side by side. The grip of their fingers is their only connection.
+//! The robots grasp the bar on its stand with the experts' skills, lift it, and carry it side by side along
+//! the case's path. Their fingers' grip on the bar is their only connection.
 
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
@@ -24,13 +24,13 @@ use crate::error::BenchError;
 use crate::report::{CaseFigures, CaseReport};
 use crate::seeds::over_seeds;
 
-/// A case: a way of the bar.
+/// A case, defined by a path of the bar.
 pub struct CarryingCase {
     pub name: &'static str,
     legs: &'static [PathLeg],
 }
 
-/// Part of a way, from rest to rest.
+/// Segment of a path, from rest to rest.
 struct PathLeg {
     /// Distances ahead and to the left, relative to the robots' initial heading.
     by_m: [f32; 2],
@@ -39,7 +39,7 @@ struct PathLeg {
 }
 
 pub const CASES: [CarryingCase; 3] = [
-    // The first leg takes the robot on the right clear of the stand, which it passes.
+    // The first leg moves the right robot clear of the stand, which it then passes.
     CarryingCase { name: "carry_bar_left", legs: &[straight(-0.3, 0.0), straight(0.0, 2.0)] },
     CarryingCase { name: "carry_bar_forward_back", legs: &[straight(2.0, 0.0), straight(-2.0, 0.0)] },
     CarryingCase { name: "carry_bar_turn", legs: &[PathLeg { by_m: [0.0; 2], turn_rad: FRAC_PI_2 }] },
@@ -53,7 +53,7 @@ const fn straight(ahead_m: f32, left_m: f32) -> PathLeg {
 const APART_M: f32 = 0.65;
 const LIFT_M: f32 = 0.1;
 const PACE_M_S: f32 = 0.2;
-/// Number of points per leg at which a way is sampled.
+/// Number of points per leg at which a path is sampled.
 const WAY_POINTS: usize = 200;
 
 /// Task of two robots and a bar.
@@ -83,21 +83,21 @@ pub fn run(
     Ok(CaseReport { case: case.name.into(), seeds: trials.len(), survived: done.len(), figures })
 }
 
-/// Result for a bar that was carried to the end of its way.
+/// Result for a bar that was carried to the end of its path.
 struct CarryResult {
-    /// Heading error of the robot with the largest one.
+    /// Largest heading error of a robot.
     heading_error_deg: f32,
-    /// Distance of the bar's middle from the end of its way; `off_way_m` is its largest distance from the
-    /// way itself.
+    /// Final distance of the bar's middle from the end of its path; `off_way_m` is the largest distance from
+    /// the path.
     final_drift_m: f32,
     off_way_m: f32,
     /// Largest tilt of the bar.
     tilt_deg: f32,
-    /// Mean power of a robot.
+    /// Mean mechanical power of a robot.
     power_w: f32,
 }
 
-/// Plays one seed; `None` if a robot fell, or hands lost the bar for good.
+/// Plays one seed. Returns `None` if a robot fell, or the hands lost the bar for good.
 fn trial(
     case: &CarryingCase,
     robot: &RobotFile,
@@ -125,7 +125,7 @@ fn trial(
     Ok(aloft.get().filter(|_| held).map(|start| measure(case, &start, &logged.log)))
 }
 
-/// Takes the bar, lifts it, and carries it. The bar is logged from the lift on.
+/// Grasps the bar, lifts it, and carries it. The state of the bar is logged from the lift on.
 fn carry(
     case: &CarryingCase,
     episode: &mut dyn PrivilegedEpisode,
@@ -151,12 +151,12 @@ fn carry(
 }
 
 impl PathLeg {
-    /// Returns the distance that the robots walk.
+    /// Returns the distance walked by each robot.
     fn length_m(&self) -> f32 {
         Vector::from([self.by_m[0], self.by_m[1], 0.0]).length() + self.turn_rad.abs() * APART_M
     }
 
-    /// Returns the bar's pose after this share of the leg.
+    /// Returns the bar's pose after the fraction `share` of the leg.
     fn at(&self, from: &Pose, share: f32) -> Pose {
         let by_m = Vector::new(self.by_m[0], self.by_m[1], 0.0) * share;
         let turned = Rotation::from_rotation_z(self.turn_rad * share);
@@ -171,7 +171,7 @@ struct LogEntry {
     power_w: f32,
 }
 
-/// An episode that logs the state while the bar is aloft.
+/// An episode that logs the state while the bar is lifted.
 struct LoggedEpisode<'a> {
     episode: InProcess,
     aloft: &'a Cell<Option<Pose>>,

@@ -1,5 +1,5 @@
-//! Robots that walk to places by `walk_to`, with empty hands or as a team with a load: cases of the bench
-//! of base controllers.
+//! Cases of the bench of base controllers in which robots call `walk_to`, with empty hands or as a team with
+//! a load.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::RangeInclusive;
@@ -20,24 +20,24 @@ use crate::error::BenchError;
 use crate::report::{CaseFigures, CaseReport};
 use crate::seeds::{is_asked, over_seeds};
 
-/// Task of a robot alone on a floor.
+/// Task of a single robot on an empty floor.
 static TASK: LazyLock<Task> = LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));
 
-/// Number of successive places, each relative to the end of the last walk.
+/// Number of successive targets, each relative to the end of the previous walk.
 const PLACES: usize = 3;
-/// Range of the distance between places, and limit of the turn, of a robot on an empty floor.
+/// Range of the distance to the next target, and limit of the turn, for a single robot on an empty floor.
 const AWAY_M: [f32; 2] = [0.05, 0.6];
 const TURN_RAD: f32 = FRAC_PI_2;
-/// The same values for a team in the room of its task. The team walks forth and back along the free way,
+/// The same values for a team in the room of its task. The team walks back and forth along the free path,
 /// since there is furniture on both sides.
 const CARRIED_AWAY_M: [f32; 2] = [0.05, 0.35];
 const CARRIED_TURN_RAD: f32 = 0.2;
 const MAX_STEPS: u32 = 1500;
 
-/// Worst figures over the calls of a robot or a team.
+/// Worst values over the calls of a robot or a team.
 #[derive(Clone, Debug, Default)]
 struct PlaceResult {
-    /// Final distance of a pelvis from its place; `off_rad` is its heading error.
+    /// Final distance of a pelvis from its target; `off_rad` is its heading error.
     off_m: f64,
     off_rad: f64,
     /// Change of the wrists' horizontal position relative to their pelvis, from before the first call to
@@ -86,7 +86,7 @@ pub fn run(
     Ok(())
 }
 
-/// Plays one seed; `None` if a robot fell, or the team did not come to hold its load.
+/// Plays one seed. Returns `None` if a robot fell, or the team did not grasp its load.
 fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceResult>, BenchError> {
     let session = Session::start(spec, None).map_err(Box::new)?;
     let mut episode = InProcess::new(session);
@@ -126,7 +126,7 @@ fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceRe
     Ok(Some(result))
 }
 
-/// Draws a displacement in any direction, and a turn.
+/// Draws a displacement in a random direction, and a turn.
 fn drawn(random: &mut SplitMix64) -> (Vector3<f64>, f64) {
     let (away_m, angle_rad) = (random.uniform(AWAY_M), random.uniform([0.0, TAU]));
     let turn_rad = random.uniform([-TURN_RAD, TURN_RAD]);
@@ -134,7 +134,8 @@ fn drawn(random: &mut SplitMix64) -> (Vector3<f64>, f64) {
     (f64::from(away_m) * Vector3::new(cosine, sine, 0.0), turn_rad.into())
 }
 
-/// Draws a displacement forth or back along the way of a load, and a turn: to the left and back.
+/// Draws a displacement along the path of a load, and a turn. Both are positive for even places and negative
+/// for odd ones.
 fn drawn_along(load: &SharedLoad, place: usize, random: &mut SplitMix64) -> (Vector3<f64>, f64) {
     let sign = if place.is_multiple_of(2) { 1.0 } else { -1.0 };
     let (away_m, turn_rad) = (random.uniform(CARRIED_AWAY_M), random.uniform([0.0, CARRIED_TURN_RAD]));
@@ -143,7 +144,7 @@ fn drawn_along(load: &SharedLoad, place: usize, random: &mut SplitMix64) -> (Vec
     (sign * f64::from(away_m) * way_m, sign * f64::from(turn_rad))
 }
 
-/// Returns the goals of the pelvises for a displacement, and a turn about the middle of the team.
+/// Returns the target poses of the pelvises for a displacement, and a turn about the centre of the team.
 fn goals(session: &Session, team: &[usize], by_m: Vector3<f64>, turn_rad: f64) -> Vec<Isometry3<f64>> {
     let at: Vec<Isometry3<f64>> = team.iter().map(|robot| upright(&pelvis(session, *robot))).collect();
     let middle_m = at.iter().map(|at| at.translation.vector).sum::<Vector3<f64>>() / at.len() as f64;
@@ -152,7 +153,7 @@ fn goals(session: &Session, team: &[usize], by_m: Vector3<f64>, turn_rad: f64) -
     at.iter().map(|at| moved * at).collect()
 }
 
-/// Sends each robot to its place, given in its own start frame according to its odometry.
+/// Sends each robot to its target, expressed in its start frame according to its odometry.
 fn send(
     session: &mut Session,
     team: &[usize],
@@ -208,8 +209,8 @@ fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
 mod tests {
     use super::*;
 
-    /// Plays a case on three seeds: no robot falls, and every pelvis comes to rest within `off_m` and 1.5
-    /// degrees of its place.
+    /// Plays a case on three seeds. Checks that no robot falls, and that every pelvis comes to rest within
+    /// `off_m` and 1.5 degrees of its target.
     fn comes_to_its_place(filter: &str, off_m: f32, squeezed_m: f32) {
         let mut played = 0;
         let mut check = |report: CaseReport| {

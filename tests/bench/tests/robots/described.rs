@@ -1,5 +1,5 @@
-//! Robots that descriptions build: the walker of the examples with other orders of joints, fewer joints, other
-//! frames, and with content that robots do not use.
+//! Tests of robots built from descriptions: the example walker with reordered joints, fewer joints, other
+//! frames, and content that robots do not use.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(examples.join(name)).expect("an example")
 }
 
-/// Replaces all occurrences. There has to be exactly one.
+/// Applies the replacements to the text. Each text to replace must occur.
 #[track_caller]
 fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
     changes.iter().fold(text.to_string(), |text, (from, to)| {
@@ -23,7 +23,7 @@ fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
     })
 }
 
-/// Returns the walker's MJCF without the lines that contain a word, and with two lines exchanged on each side.
+/// Returns the walker's MJCF with the lines of two joints exchanged on each side.
 fn exchanged(first: &str, second: &str) -> String {
     let mut lines: Vec<String> = text("walker.xml").lines().map(str::to_string).collect();
     for side in ["l", "r"] {
@@ -66,8 +66,8 @@ fn check_survives(model: &Arc<RobotModel>, case: &str) {
     assert_eq!(found.survived, 1, "{found:?}");
 }
 
-/// A robot behaves the same for any order of the joints in a limb: controller, loads on hands and frames of
-/// feet depend on the tree alone.
+/// A robot behaves the same for any order of the joints in a limb. The controller, loads on hands and frames
+/// of feet depend only on the kinematic tree.
 #[test]
 fn joints_of_a_limb_may_have_any_order() {
     for (first, second, case) in [
@@ -84,7 +84,7 @@ fn joints_of_a_limb_may_have_any_order() {
     }
 }
 
-/// Mirrored motors, as in small servo robots: the right knee and both ankles turn the other way.
+/// Tests mirrored motors, which small servo robots have: the right knee and both ankles turn the other way.
 #[test]
 fn legs_bend_whichever_way_their_motors_turn() {
     let turned = replaced(
@@ -114,7 +114,8 @@ fn legs_bend_whichever_way_their_motors_turn() {
     check_survives(&turned, "forward_0.4");
 }
 
-/// Without an ankle's roll, a foot rolls on the middle of its sole, as on this edge.
+/// Without a roll joint in the ankle, the foot rolls about the midline of its sole. The capsule has this
+/// shape.
 #[test]
 fn a_robot_whose_ankles_do_not_roll_stands_and_walks() {
     let mjcf = without(&text("walker.xml"), &["joint name=\"roll_"]);
@@ -131,10 +132,10 @@ fn a_robot_whose_ankles_do_not_roll_stands_and_walks() {
     check_survives(&model, "forward_0.4");
 }
 
-/// Anchors and axes of frames are a matter of the file: the robot is the same.
+/// Origins and axes of body frames are a convention of the file. The robot behaves the same.
 #[test]
 fn frames_of_bodies_do_not_matter() {
-    // The foot's frame is turned by a quarter about x; the knee's joint is beside its body's origin.
+    // The foot's frame is rotated by 90 degrees about x; the knee joint is not at its body's origin.
     let turned = replaced(
         &text("walker.xml"),
         &[(
@@ -212,7 +213,7 @@ fn a_robot_without_arms_is_read() {
     check_survives(&model, "stand_waving");
 }
 
-/// All reasons come in one error, each with the file and the line, or the entry, and the correct form.
+/// One error lists all reasons, each with the file and the line, or the entry, and the correct form.
 #[test]
 fn all_reasons_to_refuse_a_robot_come_at_once() {
     let mjcf = replaced(
@@ -258,7 +259,7 @@ fn all_reasons_to_refuse_a_robot_come_at_once() {
     }
 }
 
-/// A draft names the joints like the example, regardless of the names in the file.
+/// A draft assigns the same joints as the example, regardless of the names in the file.
 #[test]
 fn a_draft_finds_the_joints_of_a_robot() {
     let numbered = {
@@ -289,7 +290,7 @@ fn a_draft_finds_the_joints_of_a_robot() {
     }
 }
 
-/// Returns the reason why a robot does not stand for a second; `None` if it does.
+/// Returns the reason why a robot does not stand for a second, or `None` if it does.
 #[track_caller]
 fn falls(mjcf: &str) -> Option<String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -300,7 +301,7 @@ fn falls(mjcf: &str) -> Option<String> {
     check_robot(&robot).expect("a trial").falls
 }
 
-/// A robot that is too weak falls, and its joints are named.
+/// A robot that is too weak falls, and the error names its joints.
 #[test]
 fn a_robot_that_cannot_stand_is_found_by_a_second_of_standing() {
     assert_eq!(falls(&text("walker.xml")), None);

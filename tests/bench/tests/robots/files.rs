@@ -1,4 +1,5 @@
-//! Robots of files: those that lack joints, and those that a description builds from third-party MJCF.
+//! Tests of robots from files: robots that lack joints, and robots that a description builds from third-party
+//! MJCF.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +14,7 @@ fn walker() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gateway/examples/robots/walker.toml")
 }
 
-/// Returns the embedded robot's file without its fingers: the lines of 29 joints remain.
+/// Returns the embedded robot's file without the fingers; 29 joints remain.
 fn without_fingers() -> String {
     let mut text = assets::robot(DEFAULT_ROBOT).expect("embedded").to_string();
     let xml = roxmltree::Document::parse(&text).expect("XML");
@@ -66,8 +67,8 @@ fn a_robot_without_fingers_stands_with_joints_that_it_lacks_at_0() {
     }
 }
 
-/// A robot of another size, with other names, a waist that turns and arms of four joints. It is moved by
-/// the same controller, as in the bench.
+/// The same controller as in the bench moves a robot of another size, with other names, a waist with yaw only
+/// and arms with four joints.
 #[test]
 fn a_described_robot_stands_walks_and_squats() {
     let model = Arc::new(RobotSource::read(&walker()).expect("a robot").model);

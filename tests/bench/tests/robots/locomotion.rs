@@ -1,4 +1,5 @@
-//! The default base controller walks, carries, yields and comes back, with bit-identical reruns.
+//! Tests of the default base controller: it walks, carries loads, yields to pulls and returns, with
+//! bit-identical reruns.
 
 use std::sync::Arc;
 
@@ -35,8 +36,8 @@ fn walks_as_commanded_and_stops() {
     for case in ["forward_0.4", "mix_backward_right_turn", "left_0.25_2kg"] {
         let report = report(case, 1);
         assert_eq!(report.survived, 1, "{report:?}");
-        // The bench prints 0.4 to 2.3 %, 0.0 to 0.4 degrees, 0.6 to 0.9 s and 1.1 to 1.5 s; tilts of 0.9
-        // to 3.2 degrees.
+        // The bench prints velocity errors of 0.4 to 2.3 %, heading errors of 0.0 to 0.4 degrees, 0.6 to 0.9
+        // s until standing, 1.1 to 1.5 s until still, and tilts of 0.9 to 3.2 degrees.
         assert!(report.figures.velocity_error_share.unwrap() < 0.03, "{report:?}");
         assert!(report.figures.heading_error_deg.unwrap() < 1.0, "{report:?}");
         assert!(
@@ -48,7 +49,7 @@ fn walks_as_commanded_and_stops() {
     }
 }
 
-/// Speeds of 0.03 to 0.1 m/s, or rad/s, for 0.5 to 2 s.
+/// The commands are 0.03 to 0.1 m/s, or rad/s, for 0.5 to 2 s.
 #[test]
 fn short_commands_move_the_base_by_speed_times_time() {
     let reports = reports("pulse_", 3);
@@ -60,8 +61,9 @@ fn short_commands_move_the_base_by_speed_times_time() {
     }
 }
 
-/// The pelvis of a stepping robot is 0.62 to 0.68 m high, as the brief for policies states, even if another
-/// height is commanded. It sinks to step from a higher stance, and rises to step from a lower one.
+/// The pelvis of a stepping robot is 0.62 to 0.68 m high, as stated in the brief for policies, even if
+/// another height is commanded. The robot sinks to step from a higher stance, and rises to step from a lower
+/// stance.
 #[test]
 fn walks_as_high_as_policies_are_told() {
     let (mut world, mut command) = walking();
@@ -83,7 +85,8 @@ fn walks_as_high_as_policies_are_told() {
         };
         (0..200).map(|_| height_m()).collect()
     };
-    // At this height it loses its stance at times, steps up and goes down again: its lowest height counts.
+    // At this height the robot sometimes loses its stance, rises to step, and sinks again. The lowest height
+    // counts.
     let lowest_m = heights_m_at(0.0).into_iter().fold(f32::MAX, f32::min);
     assert!((0.49..0.56).contains(&lowest_m), "it stands {lowest_m} m high, told 0.50 m");
     let height_m = heights_m_at(0.4)[199];
@@ -99,16 +102,17 @@ fn stays_on_its_feet_under_pushes_and_pulls() {
     }
 }
 
-/// One punch of 200 to 300 N each, at any of the links that tours punch. None of 100 seeds fell.
+/// Each robot receives one punch of 200 to 300 N on any of the links that tours punch. No robot fell on 100
+/// seeds.
 #[test]
 fn hardly_a_punch_fells_a_robot() {
     let report = report("punch", 40);
     assert!(report.survived >= 39, "{report:?}");
 }
 
-/// Results of the bench for ten seeds, which are ten directions: 7.0 cm and 0.0 degrees at 15 N a hand,
-/// 13.3 cm and 1.1 degrees at 25 N, level, and 6.1 cm and 0.1 degrees with 25 N at one hand. No robot
-/// takes a step.
+/// Results of the bench for ten seeds, which select ten directions, with horizontal pulls: 7.0 cm and 0.0
+/// degrees at 15 N per hand, 13.3 cm and 1.1 degrees at 25 N per hand, and 6.1 cm and 0.1 degrees at 25 N on
+/// one hand. No robot takes a step.
 #[test]
 fn keeps_its_place_while_its_hands_are_pulled() {
     for (case, drift_m) in
@@ -121,8 +125,8 @@ fn keeps_its_place_while_its_hands_are_pulled() {
     }
 }
 
-/// 40 N at both hands are more than a robot can withstand. Released after three seconds, it goes back to
-/// its place, within 9.3 cm and 3.3 degrees on the bench.
+/// 40 N on both hands is more than a robot can withstand. Released after three seconds, it returns to its
+/// position within 9.3 cm and 3.3 degrees on the bench.
 #[test]
 fn goes_back_to_its_place_after_it_was_pulled_away() {
     let report = report("stand_pull_40n", 10);

@@ -1,4 +1,4 @@
-//! Robots of files, and the base controllers that move them, by cases of the bench.
+//! Tests of robots from files, and of the base controllers that move them, with cases of the bench.
 
 mod described;
 mod files;

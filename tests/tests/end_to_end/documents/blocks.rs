@@ -45,7 +45,7 @@ fn commands_in_the_text_are_accepted() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Checks a block that is not run. Scripts and tool bodies have tests of their own.
+/// Checks a block that is not run. Scripts and tool bodies have separate tests.
 fn check(block: &Block) -> Result<(), String> {
     match (block.language.as_str(), block.purpose.as_str()) {
         ("sh", "run") => Ok(()),
@@ -79,7 +79,7 @@ fn check(block: &Block) -> Result<(), String> {
     }
 }
 
-/// Returns the file in a folder of the repository that has the block's text.
+/// Returns the path of the file in a folder of the repository whose content equals the block's text.
 fn example(block: &Block, folder: &str) -> Result<PathBuf, String> {
     let examples = fs::read_dir(root().join(folder)).map_err(|error| error.to_string())?;
     let is_this = |path: &Path| fs::read_to_string(path).is_ok_and(|text| text == block.text);
@@ -87,7 +87,7 @@ fn example(block: &Block, folder: &str) -> Result<PathBuf, String> {
     paths.find(|path| is_this(path)).ok_or_else(|| format!("no file in {folder} has this text"))
 }
 
-/// Calls `read` with a file that has the block's text.
+/// Calls `read` with the path of a temporary file that contains the block's text.
 fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result<(), String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(format!("block.{}", block.language));
@@ -116,7 +116,7 @@ pub fn is_installed(program: &str) -> bool {
     succeeds(Command::new(program).arg("--version"))
 }
 
-/// No other check compiles the Python files given to users.
+/// Compiles the Python files for users, which no other check compiles.
 #[test]
 fn examples_are_python() {
     let folders = ["agents", "bridges", "environments", "servers", "training"]

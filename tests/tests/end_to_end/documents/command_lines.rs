@@ -12,7 +12,7 @@ use super::pages::root;
 const OTHERS: [&str; 8] =
     ["claude", "export", "inspect", "jupyter", "jupytext", "mdbook", "ollama", "openssl"];
 
-/// Values of a cluster's variables, with which a line can be parsed.
+/// Values for the environment variables of a cluster, with which command lines can be parsed.
 const VARIABLES: [(&str, &str); 6] = [
     ("$(JOB_COMPLETION_INDEX)", "0"),
     ("$SLURM_ARRAY_TASK_ID", "0"),
@@ -48,7 +48,7 @@ pub fn check_args(manifest: &str) -> Result<(), String> {
     check_tandem(&args)
 }
 
-/// Checks a command mentioned in prose, which may omit required arguments such as a file. Other words in
+/// Checks a command mentioned in prose, which may omit required arguments such as a file. Other texts in
 /// backticks pass.
 pub fn check_mention(text: &str) -> Result<(), String> {
     let found = commands(text);
@@ -165,7 +165,7 @@ fn expect_feature(feature: &str) -> Result<(), String> {
     }
 }
 
-/// Checks that the named package, or any, has this integration test and the module by which it is filtered.
+/// Checks that the named package, or any package, has this integration test and the module in its filter.
 fn expect_test(args: &[&str], test: &str) -> Result<(), String> {
     let package = args.windows(2).find(|pair| pair[0] == "-p").map(|pair| pair[1]);
     let folders = match package {
@@ -224,13 +224,13 @@ fn commands(script: &str) -> Vec<Vec<String>> {
     splitter.commands
 }
 
-/// State of the splitter.
+/// State of the splitter of scripts.
 #[derive(Default)]
 struct Splitter {
     commands: Vec<Vec<String>>,
     command: Vec<String>,
     word: Option<String>,
-    /// Set when the next word is a redirection's file.
+    /// True if the next word is the file of a redirection.
     redirected: bool,
 }
 

@@ -33,7 +33,7 @@ fn documents_weigh_objects_as_their_files_do() {
                 let mass_kg = whole_kg(spot);
                 assert!(stated.is(mass_kg), "{}: {} kg, and not {mass_kg} kg", spot.name, stated.text);
             }
-            // The comments in the object's file.
+            // Also checks the comments in the object's file.
             let file = file(spot);
             for (end, _) in file.match_indices(" kg in all") {
                 let stated = Kilograms::read(file[..end].rsplit(' ').next().unwrap_or_default());
@@ -48,7 +48,7 @@ fn documents_weigh_objects_as_their_files_do() {
     }
 }
 
-/// A mass as a text states it, with its number of digits.
+/// A mass stated in a text, with its number of digits.
 struct Kilograms {
     text: String,
     kg: f32,
@@ -59,14 +59,14 @@ impl Kilograms {
         Some(Kilograms { text: text.into(), kg: text.parse().ok()? })
     }
 
-    /// Returns true if the text is this mass, rounded.
+    /// Returns true if the text states this mass, rounded.
     fn is(&self, mass_kg: f32) -> bool {
         let digits = self.text.split_once('.').map_or(0, |(_, digits)| digits.len());
         (self.kg - mass_kg).abs() <= 0.501 * 0.1_f32.powi(digits as i32)
     }
 }
 
-/// Returns every mass in a text.
+/// Returns every mass stated in a text.
 fn stated_kg(text: &str) -> Vec<Kilograms> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let pairs = words.windows(2).filter(|pair| pair[1].trim_matches(|c: char| !c.is_alphanumeric()) == "kg");

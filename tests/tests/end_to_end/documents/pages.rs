@@ -11,7 +11,7 @@ pub const BOOK: &str = "docs/src";
 /// The book's table of contents.
 pub const CONTENTS: &str = "SUMMARY.md";
 
-/// A page.
+/// A page of the documents.
 pub struct Page {
     /// Path relative to the root of the repository.
     pub path: PathBuf,

@@ -1,8 +1,8 @@
 //! Tests that run the scripts of the pages. All `sh,run` blocks of a page are one script, with its own server
 //! and folder.
 //!
-//! The path begins with three programs of ours: `tandem`, which is this test program; `cargo`, which runs
-//! it; and `curl`, which fails on an error status.
+//! `PATH` begins with a folder of three test programs: `tandem`, which is this test program; `cargo`, which
+//! runs it; and `curl`, which fails on an error status.
 
 use std::{
     env, fs,
@@ -25,13 +25,13 @@ use super::{
 /// Address of the server in the pages.
 const ADDRESS: &str = "127.0.0.1:8700";
 
-/// Environment variable with the arguments of `tandem`, one a line, for this program in that role.
+/// Environment variable with the arguments for this program in the role of `tandem`, one per line.
 const ARGUMENTS: &str = "TANDEM_DOCUMENTS_ARGUMENTS";
 
 /// Name of the test that acts as `tandem`.
 const AS_TANDEM: &str = "documents::scripts::this_program_is_tandem_where_a_script_calls_it";
 
-/// Policy for the loop in a page: it does not move.
+/// Policy for the Python loop in a page. It keeps the robots still.
 const POLICY: &str = "import numpy as np
 def policy(image, state):
     return np.tile([0.0] * 34 + [0.75], (20, 1))
@@ -102,7 +102,7 @@ fn run_script(page: &Page, script: &str) {
         return;
     }
     let began = Instant::now();
-    // Some pages call a server with a task file; this is the file.
+    // Task file for the pages that call a server with a task file.
     let task_file = Some(vec![root().join("gateway/examples/tasks/pass_the_parcel.toml")]);
     let server = TestServer::with(Layer { task_file, ..Layer::default() });
     let folder = workplace();
@@ -124,7 +124,7 @@ fn expect_success(page: &Page, output: std::io::Result<Output>) {
     assert!(output.status.success(), "{}: {}\n{failed}\n{told}", page.path.display(), output.status);
 }
 
-/// Makes a folder with links to the repository's folders, and our own programs in `bin`.
+/// Creates a folder with links to the repository's folders, and the test programs in `bin`.
 fn workplace() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for name in ["episodes", "gateway", "sim", "tests"] {

@@ -55,7 +55,7 @@ fn the_reference_has_every_flag_with_its_meaning() {
     for (name, flags) in &subcommands {
         let section = sections.iter().find(|section| section.lines().next() == Some(name));
         let section = section.unwrap_or_else(|| panic!("the reference has no section {name}"));
-        // `doctor` has the flags of `serve`; the book refers to those.
+        // `doctor` has the same flags as `serve`, to which the book refers.
         if name == "doctor" {
             let serve = subcommands.iter().find(|(name, _)| name == "serve").map(|(_, flags)| flags);
             assert_eq!(serve, Some(flags), "`doctor` takes what `serve` takes");

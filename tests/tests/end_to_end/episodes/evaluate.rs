@@ -80,13 +80,13 @@ fn what_policies_are_told_is_recorded_and_not_mixed() {
     let name = "expert + phases told: never + hints: on";
     let never = play(three, paper, Disclosure::Never, Hints::On, name);
     assert_eq!(never.result.phases, live.result.phases, "results have every phase");
-    // Another assistance is another run, which needs a folder of its own.
+    // A run with other assistance needs a separate folder.
     let mixed = evaluate(&EvaluationPlan { assistance: paper, ..plan(1, vec![1]) }, one.path(), &|_| {});
     let refused = mixed.expect_err("another run is there").to_string();
     assert!(refused.contains("assistance is \"paper\", and was \"full\""), "{refused}");
 }
 
-/// Returns the state hashes, without the machine's timings.
+/// Returns seeds and state hashes, without the machine's timings.
 fn hashes(episodes: &[PlayedEpisode]) -> Vec<(u32, Option<&str>)> {
     episodes.iter().map(|episode| (episode.spec.seed, episode.result.state_hash.as_deref())).collect()
 }
@@ -100,7 +100,7 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
     assert_ne!(alone.episodes[0].result.state_hash, alone.episodes[1].result.state_hash);
     assert_eq!(alone.tasks["handover"].p3, 2);
 
-    // A stored episode keeps the figures of the machine that played it; a lost one is played again.
+    // A stored episode keeps the timings of the machine that played it. A missing episode is played again.
     std::fs::remove_file(one.path().join("episodes/handover-2.json")).expect("the file was written");
     let finished = AtomicU32::new(0);
     let count = |_: EpisodeEvent| {
@@ -146,8 +146,8 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     assert_eq!((level.two_robots.collaborative_share, level.two_robots.drop_share), (Some(1.0), Some(0.0)));
 }
 
-/// Commands of one seed replayed on another are open-loop control, not a policy; a report includes their
-/// success.
+/// Replaying the commands of one seed on another is open-loop control, not a policy. A report includes its
+/// success rate.
 #[test]
 fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -173,7 +173,7 @@ fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
     assert!(floor.players.iter().any(|rate| rate.player == "open-loop" && rate.measured == "in this report"));
 }
 
-/// For a failed episode only the result is stored, and the episode is not played again.
+/// Only the result of a failed episode is stored, and the episode is not played again.
 #[test]
 fn only_what_succeeded_is_kept_where_that_is_wished() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -187,8 +187,8 @@ fn only_what_succeeded_is_kept_where_that_is_wished() {
     assert_eq!(again.expect("it was played").tasks["handover"].p3, 0);
 }
 
-/// Demonstrations of one seed with variety differ, succeed, and are reproducible. Without variety the
-/// expert is unchanged.
+/// With variety, demonstrations on one seed differ, succeed, and are reproducible. Without variety the expert
+/// is unchanged.
 #[test]
 fn demonstrations_vary_as_they_are_asked_to() {
     let play = |variety: u8, disturb: f32| {

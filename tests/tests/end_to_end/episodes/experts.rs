@@ -1,5 +1,5 @@
-//! Tests of experts: they solve their tasks with real physics within the benchmark protocol's steps, on
-//! held-out seeds. After a slip, on a seed used for tuning, the hand grips its load again.
+//! Tests of experts: they solve their tasks with real physics within the benchmark protocol's step limit, on
+//! held-out seeds. After a slip, on a seed used for tuning, the hand regrasps its load.
 
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
@@ -18,12 +18,12 @@ use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 /// Tasks without walking.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Held-out seeds, drawn by lot from 7000-7099 on 2026-11-23, before any of these was ever played. No
-/// table reports them, and they are not used for tuning. They are never changed to make this test pass.
-/// Experts miss two episodes in a thousand. Three seeds cannot distinguish that from one in a hundred,
-/// and each change of physics or controller changes which episodes are missed. So the test tolerates a
-/// single miss, to be investigated on other seeds, but not two of one task. Earlier the test used seeds 3
-/// (reported in tables), 6100 (used to tune the recovery after a slip), and 6101.
+/// Held-out seeds, drawn at random from 7000-7099 on 2026-11-23, before any of these seeds was ever played.
+/// No table reports them, and they are not used for tuning. They are never changed to make this test pass.
+/// Experts fail in two episodes in a thousand. Three seeds cannot distinguish this from one in a hundred, and
+/// each change of physics or controller changes which episodes fail. So the test tolerates a single failure,
+/// to be investigated on other seeds, but not two of one task. Earlier the test used seeds 3 (reported in
+/// tables), 6100 (used to tune the recovery after a slip), and 6101.
 const SEEDS: [u32; 3] = [7030, 7054, 7081];
 
 /// Plays the experts of `tasks`. Checks that phases are reached in order, and that at most `may_fail`
@@ -36,7 +36,7 @@ fn solve(tasks: Vec<Task>, may_fail: usize) {
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
-        // Experts act on facts, and use none of the additional information of `full`.
+        // Experts act on ground truth, and use none of the additional information of `full`.
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
@@ -76,7 +76,8 @@ fn solve(tasks: Vec<Task>, may_fail: usize) {
     assert!(!fails_too_often, "task, seed, phases reached: {failed:?}");
 }
 
-/// Returns the benchmark's tasks that have an expert and are played standing, or walking.
+/// Returns the benchmark's tasks that have an expert, either those without walking (`standing`) or those with
+/// walking.
 fn solved(standing: bool) -> Vec<Task> {
     let is_wanted = |task: &&Task| STANDING.contains(&task.id.as_str()) == standing && experts::solves(task);
     tasks::cohub().iter().filter(is_wanted).cloned().collect()
@@ -97,8 +98,8 @@ fn experts_of_tandem_plus_solve_their_tasks() {
     solve(tandem_plus().to_vec(), 1);
 }
 
-/// An idle policy reaches no phase. A team without communication solves the seeds on which its guess is
-/// right, and no others.
+/// An idle policy reaches no phase. A team without communication solves exactly the seeds on which its guess
+/// is right.
 #[test]
 fn tandem_plus_needs_somebody_who_acts_and_words() {
     for task in tandem_plus() {
@@ -125,7 +126,7 @@ fn tandem_plus_needs_somebody_who_acts_and_words() {
 /// An episode in which A's left hand opens and rises for a moment while the table is carried.
 struct Slip {
     episode: InProcess,
-    /// True once the hand has let go; `took_again` is true once it has held the table since.
+    /// True once the hand has lost its grip; `took_again` is true once it holds the table again.
     slipped: bool,
     took_again: bool,
 }
@@ -170,12 +171,12 @@ fn a_hand_that_slips_off_a_load_takes_it_again() {
 /// An episode in which B and C lift a table by its legs.
 struct Lift {
     episode: InProcess,
-    /// Largest distance of the carriers from their best positions at the moment of lifting.
+    /// Largest distance of a carrier from its best position when the table is lifted.
     most_off_m: Option<f32>,
 }
 
 const CONSOLE: &str = "console_table";
-/// Distance from the table's middle to the carriers' pelvises: 0.37 m to the legs, and 0.38 m behind them.
+/// Distance from the table's middle to a carrier's pelvis: 0.37 m to the legs, and 0.38 m beyond them.
 const MIDDLE_FROM_PELVIS_M: f32 = 0.75;
 
 impl Episode for Lift {
@@ -201,8 +202,9 @@ impl PrivilegedEpisode for Lift {
     }
 }
 
-/// Regression test: on these seeds the carriers stepped towards their outstretched arms. They were 9 cm
-/// too near when they lifted, their thighs pressed on the legs during the first steps, and they fell.
+/// Regression test. On these seeds the carriers stepped towards their outstretched arms. They were 9 cm too
+/// close when they lifted the table, their thighs pressed against the table's legs during the first steps,
+/// and they fell.
 #[test]
 fn carriers_stand_where_they_are_to_when_they_lift() {
     for seed in [2009, 2103] {
@@ -245,8 +247,9 @@ impl PrivilegedEpisode for Carry {
     }
 }
 
-/// Regression test: a walking robot is lower than a standing one. B walked the bottle into the edge of
-/// the table, which turned it by 45 degrees in the hand. The opening fingers then knocked it over.
+/// Regression test. The pelvis of a walking robot is lower than that of a standing robot. B carried the
+/// bottle into the edge of the table, which turned the bottle by 45 degrees in the hand. The opening fingers
+/// then knocked it over.
 #[test]
 fn a_bottle_is_carried_over_the_edge_of_the_table() {
     let spec = EpisodeSpec::new(&tasks::find("cart_service").expect("a task"), 2029, Protocol::Benchmark);

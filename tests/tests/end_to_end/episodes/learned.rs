@@ -8,7 +8,7 @@ use tandem_tools_spec::{CameraCalibration, DepthRow};
 const MSGPACK: &str = "application/msgpack";
 const PIXELS: usize = 320 * 240;
 
-/// The fields of a reply that such a policy reads.
+/// Fields of a reply that a learned policy reads.
 #[derive(Debug, Deserialize)]
 struct StepReply {
     step: u32,
@@ -81,7 +81,7 @@ fn one_call_steps_and_returns_what_is_seen_then() {
     }
 }
 
-/// Returns the coordinate along the camera's axis of a point in the pelvis frame.
+/// Returns the coordinate along the camera's optical axis of a point given in the pelvis frame.
 fn along_axis_m(camera: &CameraCalibration, point_m: [f64; 3]) -> f64 {
     let tandem_tools_spec::Pose { position_m, quaternion_wxyz: [w, x, y, z] } = camera.camera_in_pelvis;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
@@ -113,11 +113,11 @@ fn every_form_says_the_same() {
         let depth_m = half(u16::from_le_bytes([depth[at], depth[at + 1]]));
         let row: DepthRow = serde_json::from_value(row.clone()).expect("a row");
         let expected_m = along_axis_m(&camera, row.point_m().expect("a point"));
-        // Rows are rounded to the millimetre.
+        // The positions in these rows are rounded to the millimetre.
         assert!((depth_m - expected_m).abs() < 1e-3 * expected_m + 0.001, "{depth_m} {expected_m}");
     }
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();
-    // The information beyond the benchmark's, and how often it was given.
+    // Information that the benchmark withholds, and the number of replies with it.
     let shown = ["depth_images", "pixel_depth", "joint_velocities", "joint_torques", "odometry", "gravity"];
     assert_eq!(result["extra_information"], json!(shown));
     let replies = &result["extra_information_replies"];
@@ -127,7 +127,7 @@ fn every_form_says_the_same() {
     );
 }
 
-/// Decodes a positive normal number of half precision.
+/// Decodes a positive normal half-precision number.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10), f64::from(bits & 0x3ff));
     (1.0 + fraction / 1024.0) * f64::from(exponent - 15).exp2()

@@ -15,7 +15,7 @@ fn memory_kb(what: &str) -> u64 {
     line.trim_matches([':', ' ', '\t']).trim_end_matches(" kB").parse().expect("a number")
 }
 
-/// Starts this many episodes, plays a few steps of each, and closes them.
+/// Starts `episodes` episodes, plays a few steps of each, and closes them.
 fn play(server: &TestServer, episodes: usize) {
     for _ in 0..episodes {
         let id = server.episode("benchmark");
@@ -46,9 +46,9 @@ fn five_hundred_episodes_leave_no_memory_behind() {
     check(500);
 }
 
-/// Maximum memory of an episode, as its share of the server's growth since before the first one.
+/// Maximum memory per episode: the server's growth since before the first episode, divided by their number.
 const EPISODE_KB: u64 = 12_000;
-/// Memory of a core that renders.
+/// Memory allowance per CPU core that renders.
 const CORE_KB: u64 = 40_000;
 const EPISODES: usize = 21;
 /// Environment variable set in a process that runs this test alone.
@@ -90,7 +90,7 @@ fn episodes_side_by_side() {
     assert!(most_kb <= EPISODES as u64 * EPISODE_KB + cores * CORE_KB, "at most {most_kb} kB");
 }
 
-/// Runs in a process of its own, since other tests of this program allocate memory, too.
+/// Runs in a separate process, since other tests of this program also allocate memory.
 #[test]
 fn an_episode_takes_at_most_twelve_megabytes() {
     let mut alone = Command::new(env::current_exe().expect("this program"));

@@ -1,4 +1,4 @@
-//! Tests of users' task files against the same built-in tasks, and of the stored copy of a file.
+//! Tests of users' task files against the equivalent built-in tasks, and of the stored copy of a file.
 
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
@@ -46,7 +46,7 @@ fn played(task: &Task) -> Vec<(PhaseTimes, Option<String>)> {
     episodes.into_iter().map(|played| (played.result.phases, played.result.state_hash)).collect()
 }
 
-/// A user's copy of a task with an added comment is a different task, with the same play and score.
+/// A user's copy of a task with an added comment is a different task, with the same course and score.
 #[test]
 fn a_copy_of_a_task_is_scored_as_the_task_itself() {
     for id in ["handover", "big_table"] {

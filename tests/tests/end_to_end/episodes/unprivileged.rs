@@ -4,8 +4,8 @@
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
 
-/// Pixel on the body of Handover's bottle as robot A sees it on seed 0. A person or a model would find it
-/// in the image.
+/// Pixel on the body of Handover's bottle in robot A's image on seed 0. A person or a model would find it in
+/// the image.
 const PIXEL: [u32; 2] = [188, 215];
 const BOTTLE_RADIUS_M: f64 = 0.035;
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];

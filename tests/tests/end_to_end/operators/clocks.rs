@@ -1,4 +1,4 @@
-//! Each operator's own clock.
+//! Tests of the separate clock of each operator.
 
 use std::{thread::sleep, time::Duration};
 
@@ -12,7 +12,7 @@ fn wait() -> Value {
     json!({ "steps": 5 })
 }
 
-/// A keeps B waiting until it has no time left; B's clock has hardly run by then.
+/// A keeps B waiting until A has no time left. B's clock has hardly run by then.
 #[test]
 fn who_is_waited_for_pays() {
     let server = TestServer::with(Layer { thinking_limit: Some(4), ..Layer::default() });

@@ -1,5 +1,5 @@
-//! Tests of teleoperation in real time, by one socket for each person. Messages move the person's own
-//! robot only, time stops while a person is absent, and the recording is verified.
+//! Tests of teleoperation in real time, with one WebSocket per operator. Messages move only the operator's
+//! robot, time stops while an operator is absent, and the recording is verified.
 
 use std::{
     net::TcpStream,
@@ -11,7 +11,7 @@ use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 
 use super::team::Team;
 
-/// A page that drives robots.
+/// Client that drives robots like the teleoperation page.
 pub struct DriversSocket {
     socket: WebSocket<TcpStream>,
     scene: Value,
@@ -19,7 +19,7 @@ pub struct DriversSocket {
     row: Vec<f32>,
 }
 
-/// Opens the socket with these headers. Returns the status of the response if it is refused.
+/// Opens the socket with these headers. Returns the status of the response if the connection is refused.
 fn ask_for(
     team: &Team,
     robots: &str,
@@ -32,7 +32,7 @@ fn ask_for(
     }
     let stream = TcpStream::connect(team.server.address).expect("a connection");
     let opened = tungstenite::client(request, stream.try_clone().expect("a stream"));
-    // A read with a short timeout, since no message may have arrived yet.
+    // A short read timeout, since there may be no message yet.
     stream.set_read_timeout(Some(Duration::from_millis(15))).expect("a limit");
     match opened {
         Ok((socket, _)) => Ok(socket),
@@ -54,12 +54,12 @@ fn entered(team: &Team, robot: usize) -> String {
 }
 
 impl DriversSocket {
-    /// Enters like the page, as the operator of robot number `robot`.
+    /// Signs in like the page, as the operator of robot number `robot`.
     pub fn open(team: &Team, robot: usize) -> DriversSocket {
         DriversSocket::open_for(team, &[robot])
     }
 
-    /// Enters as the operator of the first of these robots; the others stand still.
+    /// Signs in as the operator of the first of these robots. The others stand still.
     fn open_for(team: &Team, robots: &[usize]) -> DriversSocket {
         let names: Vec<&str> = robots.iter().map(|robot| ["A", "B"][*robot]).collect();
         let cookies: Vec<String> = robots.iter().map(|robot| entered(team, *robot)).collect();
@@ -83,7 +83,7 @@ impl DriversSocket {
         self.socket.send(Message::text(word)).expect("a page that is heard");
     }
 
-    /// Reads the messages that have arrived.
+    /// Reads all messages received so far.
     pub fn read(&mut self) {
         loop {
             match self.socket.read() {
@@ -103,8 +103,8 @@ impl DriversSocket {
         self.row.get(1).copied().unwrap_or_default()
     }
 
-    /// Returns the position of a robot's right wrist in its pelvis frame, with the accuracy of a standing
-    /// robot.
+    /// Returns the position of a robot's right wrist in the robot's pelvis frame. It is accurate enough for a
+    /// standing robot.
     fn wrist_m(&self, robot: usize) -> [f32; 3] {
         let robots = self.scene["robots"].as_array().expect("robots");
         let links = |robot: &Value| robot["links"].as_u64().expect("links") as usize * 7;
@@ -122,7 +122,7 @@ fn apart_m(one: [f32; 3], other: [f32; 3]) -> f32 {
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
 }
 
-/// Sends the moves of both pages' robots at 50 Hz for `time`.
+/// Sends the moves of both clients' robots at 50 Hz for `time`.
 fn drive(pages: &mut [DriversSocket], moves: [Value; 2], time: Duration) {
     let began = Instant::now();
     while began.elapsed() < time {
@@ -149,7 +149,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     let moved = [0, 1].map(|robot| apart_m(before[robot], pages[0].wrist_m(robot)));
     assert!(moved[0] > 0.1 && moved[1] < 0.02, "{moved:?}");
 
-    // B leaves: time stops, and A learns the name of the robot for which the episode waits.
+    // B disconnects: time stops, and A receives the name of the robot for which the episode waits.
     let [mut a, b] = pages;
     drop(b);
     std::thread::sleep(Duration::from_millis(300));
@@ -165,7 +165,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
         a.read();
     }
     assert_eq!(a.step(), stood);
-    // B returns, and time continues.
+    // B reconnects, and time continues.
     let mut pages = [a, DriversSocket::open(&team, 1)];
     drive(&mut pages, [still(), still()], Duration::from_secs(1));
     assert!(pages[0].step() > stood + 5.0, "{} after {stood}", pages[0].step());
@@ -176,8 +176,8 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     );
 }
 
-/// Programs drive by the same socket: by rows of joint targets, or by setpoints of all motors. After each
-/// command the robot's state comes, with the sensors of every physics step.
+/// Programs drive over the same socket, with rows of joint targets or with setpoints of all motors. After
+/// each command the server sends the robot's state, with the sensor readings of every physics step.
 #[test]
 fn a_program_drives_joints_and_motors_by_the_socket_and_is_told_the_state() {
     let team = Team::start(json!({ "patience_s": 0.05 }));
@@ -213,7 +213,7 @@ fn a_program_drives_joints_and_motors_by_the_socket_and_is_told_the_state() {
     assert!(departures.contains(&json!("control: joint (A)")), "{departures:?}");
 }
 
-/// Replies for the idle robot come on the same socket, before or after those for the own robot.
+/// The socket receives reports for the idle robot, too, before or after the reports for the operator's robot.
 #[test]
 fn a_person_beside_a_robot_that_nobody_drives_is_told_how_it_goes() {
     for robots in [[0, 1], [1, 0]] {

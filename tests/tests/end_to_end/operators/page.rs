@@ -6,7 +6,7 @@ use tandem_tests::TestServer;
 
 use super::team::Team;
 
-/// Returns an operator's command: a tenth of a second in which a wrist moves and a hand closes.
+/// Returns an operator's command of 0.1 s that moves a wrist and closes a hand.
 fn tick(robot: &str, x_m: f64) -> Value {
     json!({ "steps": 5, "robots": [{
         "robot": robot, "carried": true, "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0,
@@ -53,7 +53,7 @@ fn two_people_drive_and_time_stands_still_while_one_is_away() {
     let steps = || team.server.get(&format!("/v1/episodes/{}", team.id)).ok()["env_steps"].clone();
     let before = steps();
     std::thread::scope(|scope| {
-        // B is absent: A's command waits, and so does the world.
+        // B is absent, so A's command waits and simulated time stops.
         let waiting = scope.spawn(|| team.ask(0, "move_wrists", tick("A", 0.25)));
         std::thread::sleep(std::time::Duration::from_secs(1));
         assert!(!waiting.is_finished());
@@ -63,7 +63,7 @@ fn two_people_drive_and_time_stands_still_while_one_is_away() {
         assert_eq!(back["partners"], json!([{ "robot": "A", "did": "acted", "tool": "move_wrists" }]));
         assert_eq!(waiting.join().expect("A's answer").ok()["executed_steps"], 5);
     });
-    // The link of one robot does not move another.
+    // One robot's link does not permit commands to another robot.
     team.ask(0, "move_wrists", tick("B", 0.2)).refused(409, &["another operator's"]);
     team.verified();
 }

@@ -1,5 +1,5 @@
-//! Tests of a person's partners: the task's expert, a learned policy, and programs whose commands span
-//! several of a person's steps.
+//! Tests of the partners of a human operator: the task's expert, a learned policy, and programs whose
+//! commands span several of the operator's steps.
 
 use std::{
     sync::{
@@ -20,7 +20,7 @@ use crate::policies::act_server::ActServer;
 pub const EXPERT: &str = "/operate/expert";
 pub const POLICY: &str = "/operate/policy";
 
-/// Asks for a partner at `path` for robot B, as the caller with `token` or as the one that started the
+/// Requests a partner at `path` for robot B, as the caller with `token`, or as the caller that started the
 /// episode.
 fn asked_for(team: &Team, path: &str, token: Option<&str>) -> (u16, Value) {
     answer_to(team, path, token, json!({ "episode": team.id, "robot": "B" }))
@@ -34,7 +34,7 @@ fn answer_to(team: &Team, path: &str, token: Option<&str>, body: Value) -> (u16,
     (answer.0, serde_json::from_slice(&answer.2).unwrap_or_default())
 }
 
-/// Asks as the caller that started the episode and returns the status.
+/// Requests a partner as the caller that started the episode, and returns the status.
 pub fn ask_for(team: &Team, path: &str) -> u16 {
     asked_for(team, path, None).0
 }
@@ -71,7 +71,8 @@ fn an_expert_for_each_robot_plays_the_task_to_its_end() {
     assert!(format!("{notes:?}").contains("The task's expert drives robot B."));
 }
 
-/// An operator's token cannot start the expert or a policy, neither for its own robot nor for a partner's.
+/// An operator's token cannot start the expert or a policy, neither for the operator's robot nor for a
+/// teammate.
 #[test]
 fn who_started_the_episode_decides_who_drives_beside_operators() {
     let act = ActServer::start(|_| (200, json!({ "actions": [] })));

@@ -1,10 +1,10 @@
-//! Plans and walks of one operator beside the commands of another.
+//! Tests of plans and walks of one operator alongside the commands of another.
 
 use serde_json::json;
 
 use super::team::Team;
 
-/// B's wait of 50 steps is answered once, though A's walk is many short commands.
+/// B's wait of 50 steps gets one reply, although A's walk consists of many short commands.
 #[test]
 fn a_walk_goes_on_beside_the_partners_commands() {
     let team = Team::start(json!({ "patience_s": 5 }));
@@ -42,7 +42,7 @@ fn an_operator_waits_in_one_call_until_it_hears() {
             team.ask(0, "wait", json!({ "steps": 10 })).ok();
         }
         team.ask(0, "say", json!({ "text": "IN PLACE" })).ok();
-        // A message arrives with the reply to the next command.
+        // A message is delivered with the reply to the next command.
         team.ask(0, "wait", json!({ "steps": 10 })).ok();
         waits.join().expect("B's reply")
     });
@@ -55,7 +55,7 @@ fn an_operator_waits_in_one_call_until_it_hears() {
     team.verified();
 }
 
-/// A's walk is many short commands; B begins when it is over and A waits for B.
+/// A's walk consists of many short commands. B begins after A's walk, while A waits for B.
 #[test]
 fn operators_meet_where_both_wait() {
     let team = Team::start(json!({ "patience_s": 20 }));
@@ -84,12 +84,12 @@ fn operators_meet_where_both_wait() {
     team.verified();
 }
 
-/// A message ends a walk, a plan, and a wait for one operator. The walk of a robot that carries ends once it
-/// stands.
+/// A message ends a walk, a plan, and a wait of one operator. The walk of a robot that carries an object ends
+/// once the robot stands.
 #[test]
 fn words_end_what_was_asked_to_end_by_them() {
     let team = Team::start(json!({ "talk": true, "patience_s": 5 }));
-    // B may have been held still meanwhile, and has to look before it commands again.
+    // B may have been held still meanwhile, and must observe before its next command.
     let look = || team.ask(1, "get_robot_state", json!({ "robot": "B" })).ok();
     let until_words = |tool: &str, arguments: serde_json::Value| {
         look();
@@ -111,7 +111,7 @@ fn words_end_what_was_asked_to_end_by_them() {
         let robots = json!([{ "robot": "B", "to_m": [-1.0, 0.0], "carry": carry }]);
         json!({ "steps": 900, "robots": robots, "until_heard": true })
     };
-    // How many of A's waits B's plan has seen depends on when it came.
+    // The number of A's waits during B's plan depends on when B's request was received.
     let check = |reply: &serde_json::Value, place: &str| {
         let stopped = reply["stopped"].as_str().unwrap_or_default();
         assert!(stopped.starts_with(place) && stopped.ends_with("A has spoken"), "{reply}");

@@ -1,5 +1,5 @@
-//! Tests of two operator processes that play Handover in lockstep, one robot each: the expert's commands,
-//! in halves.
+//! Tests of two operator processes that play Handover in lockstep, each with one robot's half of the expert's
+//! commands.
 
 use std::{
     env,
@@ -15,7 +15,7 @@ use ureq::Agent;
 
 use super::team::Team;
 
-/// Environment variable with the task of an operator's process, as JSON.
+/// Environment variable with the parameters of an operator's process, as JSON.
 const TASK: &str = "TANDEM_TEST_OPERATOR";
 
 /// Returns the commands of the expert for all robots on seed 0 of Handover, and its result.
@@ -29,7 +29,7 @@ fn expert(runs: &Path) -> (Vec<(String, Value)>, ResultReply) {
     (commands.map(|call| (call.tool, call.arguments)).collect(), result)
 }
 
-/// Returns the part of a command for `robot`. A robot without a part holds still.
+/// Returns the part of a command for `robot`. A robot that the command does not mention holds still.
 fn half((tool, args): &(String, Value), robot: &str) -> (String, Value) {
     let steps = args["steps"]
         .as_u64()

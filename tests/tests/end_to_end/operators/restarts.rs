@@ -1,4 +1,4 @@
-//! Tests of restarts during teleoperation: the people's pages, the expert and a policy continue.
+//! Tests of server restarts during teleoperation: the operators' pages, the expert and a policy continue.
 
 use std::time::{Duration, Instant};
 
@@ -12,8 +12,8 @@ use super::{
 };
 use crate::policies::act_server::ActServer;
 
-/// Drives robot A for this many control steps and returns the last. Each step needs a command from both
-/// robots.
+/// Drives robot A for at least `steps` control steps and returns the number of the last. Each step needs a
+/// command for both robots.
 fn drive(team: &Team, steps: f32) -> f32 {
     let mut page = DriversSocket::open(team, 0);
     let (began, mut first) = (Instant::now(), None);

@@ -1,4 +1,4 @@
-//! Tests of the operators' turns, and of each operator's observations and messages.
+//! Tests of the rounds of the operators' commands, and of each operator's observations and messages.
 
 use std::sync::mpsc;
 
@@ -62,7 +62,7 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     let other = team.server.episode("benchmark");
     assert_eq!(status("GET", &format!("/v1/episodes/{other}")), 404, "it is not theirs to know of");
     team.server.tool_as(&team.tokens[1], &other, "wait", &json!({ "steps": 1 })).refused(404, &[]);
-    // No caller commands past the operators, and a policy of all robots has no partner to talk to.
+    // Only the operators may command robots, and a policy that directs all robots has no teammate to talk to.
     team.server.tool(&team.id, "wait", &json!({ "steps": 1 })).refused(403, &["Authorization: Bearer"]);
     team.server.tool(&other, "say", &json!({ "text": "Hello." })).refused(409, &["per_robot"]);
     assert_eq!(team.server.get(&episode).ok()["env_steps"], 0);
@@ -85,7 +85,7 @@ fn a_step_is_made_when_both_have_commanded_and_the_shorter_command_ends_it() {
     assert!(a.get("observation").is_none());
     assert_eq!(names(&b["observation"]["arrays"], "robot"), ["B"]);
 
-    // Neither an observation beside the next command nor a refused command interferes with it.
+    // Neither an observation nor a refused command interferes with the next command.
     team.ask(0, "wait", json!({ "steps": 51 })).refused(422, &["1 to 50"]);
     team.ask(0, "wait", json!({ "steps": 5, "expected_step": 3 })).refused(409, &["stands at step 4"]);
     let wait = || ("wait", json!({ "steps": 6, "expected_step": 4 }));
@@ -152,7 +152,7 @@ fn who_keeps_silent_is_held_and_told_so() {
     }
     let late = || team.ask(1, "wait", json!({ "steps": 5 }));
     late().refused(409, &["robot \"B\" was held still from step 0 to 10", "look again"]);
-    // From here on the round waits for B, and its next command counts.
+    // From now on the round waits for B, whose next command counts.
     let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
     let replies = [a.ok(), b.ok()];
     assert_eq!(replies.map(|reply| reply["step"].clone()), [15, 15]);
@@ -201,8 +201,8 @@ fn operators_talk_where_they_may() {
     assert_eq!(said[1].arguments["text"], words[1]);
 }
 
-/// Under the `partner` stress, in every fifth seed one robot is silent: its messages are recorded, and
-/// not delivered.
+/// Under the `partner` stress, one robot is silent on every fifth seed: its messages are recorded but not
+/// delivered.
 #[test]
 fn a_silent_partner_is_not_heard() {
     let stress = (Some(StressAxis::Partner), Some(StressLevel::Three));
@@ -304,7 +304,7 @@ fn only_who_asks_for_operators_gets_them() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
 }
 
-/// An operator's texts describe its own robot and the calls that it may make.
+/// The texts for an operator describe the operator's robot and the permitted calls.
 #[test]
 fn an_operators_tools_are_its_own() {
     let team = Team::start(json!({ "talk": true }));
@@ -328,7 +328,8 @@ fn an_operators_tools_are_its_own() {
     assert!(list.contains("^[B]$") && !list.contains("^[AB]$"), "{list}");
 }
 
-/// Every list of tools, and every text that names tools, includes `say` if and only if the caller may use it.
+/// Every list of tools, and every text that mentions tools, includes `say` if and only if the caller may use
+/// it.
 #[test]
 fn who_may_not_talk_is_not_offered_to() {
     let quiet = Team::start(json!({}));
@@ -337,8 +338,8 @@ fn who_may_not_talk_is_not_offered_to() {
     let grasp = json!({
         "jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": { "name": "grasp", "arguments": {} },
     });
-    // An operator without permission to talk, and a caller that has started an episode whose operators
-    // have it.
+    // An operator without permission to talk, and a caller that has started an episode whose operators may
+    // talk.
     for (team, token) in [(&quiet, quiet.tokens[0].as_str()), (&talking, "none")] {
         let bearer = format!("Bearer {token}");
         let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];

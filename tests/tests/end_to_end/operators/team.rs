@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use tandem_episodes::{Recorder, Recording, replay};
 use tandem_tests::{Answer, TestServer};
 
-/// An episode with operators, on a separate server.
+/// An episode with operators, and its server.
 pub struct Team {
     pub server: TestServer,
     pub id: String,
@@ -17,7 +17,7 @@ impl Team {
         Team::on(TestServer::start(), 0, fields)
     }
 
-    /// Starts such an episode on a server, with another seed.
+    /// Starts an episode with operators on `server`, with this seed.
     pub fn on(server: TestServer, seed: u32, fields: Value) -> Team {
         let mut body =
             json!({ "task": "handover", "seed": seed, "protocol": "benchmark", "operators": "per_robot" });

@@ -1,4 +1,4 @@
-//! Tests of the program against the benchmark's published numbers: a table of the numbers, and checks at both
+//! Tests of the program against the benchmark's published numbers: a table of the numbers, and checks on both
 //! sides of each.
 
 mod rules;

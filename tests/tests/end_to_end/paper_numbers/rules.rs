@@ -78,7 +78,8 @@ fn the_camera_and_the_joints_are_as_published() {
         assert_eq!([camera.width, camera.height], table::CAMERA_PX);
         let across_deg = 2.0 * (f64::from(camera.width) / 2.0 / camera.fx).atan().to_degrees();
         assert!((across_deg - table::CAMERA_HORIZONTAL_FOV_DEG).abs() < 0.1, "{across_deg} degrees across");
-        // The z component of the rotation's third column is the vertical component of the unit optical axis.
+        // The z component of the rotation's third column is the vertical component of the optical axis, a
+        // unit vector.
         let [w, x, y, z] = camera.camera_in_pelvis.quaternion_wxyz;
         let down_deg = -(w * w - x * x - y * y + z * z).asin().to_degrees();
         assert!((down_deg - table::CAMERA_DOWN_DEG).abs() < 0.1, "{down_deg} degrees down");
@@ -95,7 +96,7 @@ fn the_camera_and_the_joints_are_as_published() {
     assert_eq!(base, table::ACTION_BASE);
 }
 
-/// Returns the group of a joint, from Unitree's name.
+/// Returns the group of a joint, given Unitree's name.
 fn group(joint: &str) -> &'static str {
     let is_of = |parts: &[&str]| parts.iter().any(|part| joint.contains(part));
     match joint {

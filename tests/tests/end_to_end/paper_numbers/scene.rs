@@ -1,4 +1,4 @@
-//! A task's world that tests can modify, with checks of its phases.
+//! A modifiable world of a task, with checks of its phases.
 
 use tandem_episodes::{Done, EpisodeSpec, Facts, Grip, ObjectFacts, Session, tasks};
 use tandem_sim::{Pose, Rotation, Side, Vector};
@@ -6,7 +6,7 @@ use tandem_tools_spec::Protocol;
 
 use super::table::AtRest;
 
-/// Factors just inside and just outside a threshold.
+/// Factor just inside a threshold; `OUTSIDE` is just outside.
 const INSIDE: f32 = 0.999;
 const OUTSIDE: f32 = 1.001;
 
@@ -40,8 +40,8 @@ impl Scene {
         }
     }
 
-    /// Returns true if the sequence of phase `p` begins in the world modified by `change`. It must not be
-    /// broken at its beginning.
+    /// Returns true if the sequence of phase `p` begins in the world modified by `change`. The sequence must
+    /// not be broken when it begins.
     pub fn begins(&self, p: usize, change: impl Fn(&mut Facts)) -> bool {
         let mut facts = self.start.clone();
         change(&mut facts);
@@ -53,7 +53,7 @@ impl Scene {
         first.holds(&facts)
     }
 
-    /// Checks a threshold like [`Scene::threshold`], for the beginning of a sequence.
+    /// Checks the threshold at which a sequence begins, like [`Scene::threshold`].
     pub fn beginning(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
         let at = |share: f32| self.begins(p, |facts| change(facts, threshold * share));
         let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };
@@ -61,8 +61,8 @@ impl Scene {
         assert!(!at(bad), "{} p{p} begins at {}", self.task.id, threshold * bad);
     }
 
-    /// Checks that phase `p` is done on the good side of `threshold` and not on the other. With `large`,
-    /// the good side is above it.
+    /// Checks that phase `p` is done on one side of `threshold` and not on the other. With `large`, it is
+    /// done above the threshold.
     pub fn threshold(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
         let at = |share: f32| self.done(p, |facts| change(facts, threshold * share));
         let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };
@@ -70,8 +70,8 @@ impl Scene {
         assert!(!at(bad), "{} p{p} at {}", self.task.id, threshold * bad);
     }
 
-    /// Checks the limits under which phase `p` takes `object` as released and at rest. `settle` places
-    /// the object.
+    /// Checks the limits within which phase `p` accepts `object` as released and at rest. `settle` places the
+    /// object.
     pub fn rest(&self, p: usize, object: &str, limits: &AtRest, settle: impl Fn(&mut Facts)) {
         let settled = |facts: &mut Facts| {
             settle(facts);

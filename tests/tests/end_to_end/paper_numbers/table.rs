@@ -1,7 +1,7 @@
 //! The benchmark's published numbers in their published units; degrees stay degrees. Nothing here is read
 //! from a task.
 
-/// A task.
+/// Published numbers of a task.
 pub struct Published {
     pub id: &'static str,
     pub robots: usize,
@@ -9,7 +9,8 @@ pub struct Published {
     pub scene: &'static str,
     pub episode_steps: u32,
     pub moves: &'static [Moves<'static>],
-    /// True for each of p1, p2 and p3 that needs more than one robot; published for tasks of two robots.
+    /// True for each of the phases p1, p2 and p3 that requires more than one robot. Published only for tasks
+    /// with two robots.
     pub collaborative: Option<[bool; 3]>,
 }
 
@@ -31,7 +32,8 @@ const fn apple_in_tub(apple: &'static [&'static str]) -> Moves<'static> {
     moves(apple, [-0.008, 0.008], [-0.008, 0.008])
 }
 
-/// Stacks move with the containers on them, and so do the contents of containers and trolleys.
+/// Published numbers of all tasks. Stacks move together with the containers on them; containers and trolleys
+/// move together with their contents.
 pub const TASKS: [Published; 10] = [
     Published {
         id: "handover",
@@ -172,7 +174,7 @@ pub const TABLE_HEIGHT_M: f32 = 0.04;
 pub const TABLE_SQUARE_DEG: f32 = 4.0;
 pub const CONSOLE_LIFT_M: f32 = 0.03;
 pub const CONSOLE_CARRIED_M: f32 = 0.15;
-/// Side of the square mark for each foot.
+/// Side length of the square floor mark for each foot.
 pub const CONSOLE_MARK_M: f32 = 0.10;
 pub const CONSOLE_HEIGHT_M: f32 = 0.04;
 pub const DOOR_OPEN_RAD: f32 = 1.45;
@@ -181,7 +183,7 @@ pub const ROUND_LIFT_M: f32 = 0.03;
 pub const ROUND_CLEAR_M: f32 = 0.01;
 pub const ROUND_HEIGHT_M: f32 = 0.05;
 
-/// Limits of the final state of an object that stands or hangs.
+/// Limits on the final state of an object that stands or hangs.
 pub struct AtRest {
     pub tilt_deg: f32,
     pub speed_m_s: f32,

@@ -1,4 +1,5 @@
-//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks without walking.
+//! Tests of phases on both sides of every published threshold, in modified worlds, for the tasks without
+//! walking.
 
 use tandem_episodes::{A, B, Done, Facts};
 use tandem_sim::{Rotation, Side, Vector};
@@ -65,7 +66,8 @@ fn frame_hang() {
         held(facts);
         raise(facts, "frame", lift_m);
     });
-    // Places the frame's loop at the middle of the peg, rotated about it in the plane of the picture frame.
+    // Places the loop of the picture frame at the middle of the peg, rotated about the peg in the plane of
+    // the frame.
     let hang = |facts: &mut Facts, turned_deg: f32| {
         let peg_m = (facts.site_m("wall_peg", "root") + facts.site_m("wall_peg", "tip")) * 0.5;
         let rotation = Rotation::from_rotation_y(turned_deg.to_radians());

@@ -1,4 +1,5 @@
-//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks with walking.
+//! Tests of phases on both sides of every published threshold, in modified worlds, for the tasks with
+//! walking.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -173,7 +174,7 @@ fn move_house() {
             place(facts, axis * off_m + Vector::Z * 0.05);
             held_by(facts, &[B, C], "console_table");
         });
-        // The whole of a foot, 28 mm square, is on its mark.
+        // The whole foot, 28 mm square, must be on its mark.
         let beside_m = table::CONSOLE_MARK_M / 2.0 - 0.014;
         scene.threshold(3, beside_m, false, |facts, off_m| place(facts, axis * off_m));
     }

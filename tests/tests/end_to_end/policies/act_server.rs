@@ -17,7 +17,7 @@ pub struct ActServer {
 }
 
 impl ActServer {
-    /// Starts a server that answers every request by `decide`, with a status and JSON.
+    /// Starts a server that answers every request with the status and JSON returned by `decide`.
     pub fn start(decide: impl Fn(&Value) -> (u16, Value) + Send + Sync + 'static) -> ActServer {
         ActServer::start_with_text(move |request| {
             let (status, reply) = decide(request);
@@ -25,7 +25,7 @@ impl ActServer {
         })
     }
 
-    /// Starts a server like [`ActServer::start`], with arbitrary text.
+    /// Starts a server like [`ActServer::start`] whose responses are arbitrary text.
     pub fn start_with_text(decide: impl Fn(&Value) -> (u16, String) + Send + Sync + 'static) -> ActServer {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("an address");
@@ -46,7 +46,7 @@ impl ActServer {
     }
 }
 
-/// Answers one request; `None` if the client has closed the connection.
+/// Answers one request. Returns `None` if the client has closed the connection.
 fn serve(
     mut stream: &TcpStream,
     decide: &(dyn Fn(&Value) -> (u16, String) + Send + Sync),

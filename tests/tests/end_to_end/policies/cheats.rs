@@ -1,5 +1,5 @@
-//! Tests of cheats: a policy program tries them with its token alone. Each is refused, or does not affect
-//! the score.
+//! Tests of cheats: a policy program attempts them with nothing but its token. Each is refused, or does not
+//! affect the score.
 
 use std::{
     env, fs,
@@ -16,10 +16,11 @@ use tandem_tools_spec::{Driving, EndReason, Operators};
 use super::plans::{plan, play};
 
 const LONG: Duration = Duration::from_secs(100);
-/// A seed that differs from every other number in an episode.
+/// A seed that is distinguishable from every other number in an episode.
 const SEED: u32 = 48_611;
 
-/// Returns the command line that starts `cheat` below, as if it had discovered the evaluation's folder.
+/// Returns the command line that starts `cheat` below. It passes the evaluation's folder, as if the program
+/// had discovered it.
 fn cheat_command(found: &Path) -> String {
     let binary = env::current_exe().expect("this binary");
     format!(
@@ -63,7 +64,7 @@ impl Cheat {
             .1
     }
 
-    /// Tries to have another party drive.
+    /// Tries to let another party drive the robots.
     fn try_operating(&self) {
         for path in ["/operate/expert", "/operate/policy", "/operate/enter", "/operate/mark"] {
             tell("operate", json!(self.ask(path, Some(json!({ "good": true }))).0));
@@ -73,7 +74,7 @@ impl Cheat {
         }
     }
 
-    /// Requests withheld information in other ways, and sends commands that are not allowed.
+    /// Requests withheld information in other ways, and sends forbidden commands.
     fn try_looking(&self, robot: &str) {
         for frame in ["start", "level"] {
             let look = json!({ "steps": 1, "observe": { "robots": [robot], "frame": frame } });
@@ -139,11 +140,11 @@ fn cheat() {
     plant_links(folder, &found);
     tell("finish", json!(cheat.tool("finish", json!({})).1));
     tell("start", json!(cheat.ask("/v1/episodes", Some(another)).0));
-    // Forges the results again, after the server has written its own.
+    // Forges the results again, after the server has written the true results.
     forge(&found);
 }
 
-/// Writes results of a success to the evaluation's folder.
+/// Writes the forged results of a success to the evaluation's folder.
 fn forge(found: &Path) {
     let folder = found.join(format!("episodes/handover-{SEED}"));
     let forged = json!({
@@ -176,7 +177,7 @@ fn mode(_: &Path) -> u32 {
     0o700
 }
 
-/// Returns the outcomes of one program's cheats with this name.
+/// Returns the outcomes of the cheat with this name, parsed from the output of a program.
 fn came(stdout: &str, name: &str) -> Vec<Value> {
     let all =
         stdout.lines().filter_map(|line| serde_json::from_str::<Value>(line.strip_prefix("CHEAT ")?).ok());
@@ -283,7 +284,8 @@ fn examples_put_no_token_on_a_command_line() {
     let place = tempfile::tempdir().expect("a temporary folder");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../gateway/examples/agents");
     for name in ["claude", "codex"] {
-        // Replaces the program that the example runs, and prints its arguments and the files among them.
+        // Replaces the program that the example runs. The replacement prints its arguments and the contents
+        // of files among them.
         let fake = place.path().join(name);
         let script = "#!/bin/sh\necho \"$@\"\nfor word in \"$@\"; do if [ -f \"$word\" ]; then ls -l \"$word\"; cat \"$word\"; fi; done\n";
         fs::write(&fake, script).expect("a file");

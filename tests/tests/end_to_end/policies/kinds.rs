@@ -1,6 +1,6 @@
-//! Tests of learned policies with other outputs than joint rows at 50 Hz: wrist poses, differences from
-//! the measured state, and rows at their own rate. Further tests of policies that observe more than one
-//! moment. Their outputs reach the episode as calls that can be replayed.
+//! Tests of learned policies with outputs other than joint rows at 50 Hz: wrist poses, differences from the
+//! measured state, and rows at another rate. Other tests have policies that observe more than one time step.
+//! All outputs reach the episode as calls that can be replayed.
 
 use std::path::Path;
 
@@ -19,15 +19,15 @@ use super::{
     servers::map,
 };
 
-/// The requests for A, and the outcome of the episode.
+/// Outcome of an episode, and the requests for robot A.
 struct Played {
     episode: PlayedEpisode,
     recording: Recording,
-    /// Requests for A, without the trial before the episode.
+    /// Requests for robot A, without the trial request before the episode.
     asked: Vec<rmpv::Value>,
 }
 
-/// Plays Handover with a policy that answers requests by `rows`, and verifies the recording.
+/// Plays Handover with a policy that answers requests with `rows`, and verifies the recording.
 fn played(
     map_text: &str,
     rows: impl Fn(&rmpv::Value) -> Vec<Vec<f32>> + Send + Sync + Copy + 'static,
@@ -72,7 +72,7 @@ impl Played {
     }
 }
 
-/// A position in front of the robot.
+/// Target position in front of the robot.
 const GOAL_M: [f32; 3] = [0.32, -0.22, 0.14];
 /// Orientation in which the right palm, which faces left at first, is turned down.
 const PALM_DOWN_ROWS: [f32; 6] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
@@ -91,7 +91,7 @@ rate_hz = 10
 fn a_policy_may_tell_where_wrists_are_to_be() {
     let played = played(WRIST, |request| {
         let wrist = floats(request, "wrist");
-        // Moves straight to the goal, by 3 cm a row.
+        // Moves straight to the goal, by 3 cm per row.
         let way: Vec<f32> = GOAL_M.iter().zip(&wrist).map(|(goal, at)| goal - at).collect();
         let length_m = way.iter().map(|part| part * part).sum::<f32>().sqrt().max(1e-6);
         let row = |number: u8| {
@@ -101,7 +101,7 @@ fn a_policy_may_tell_where_wrists_are_to_be() {
         };
         (1..=10).map(row).collect()
     });
-    // Twenty observations, and ten rows after each, of five control steps.
+    // Twenty observations, each followed by ten rows of five control steps.
     assert_eq!(played.episode.result.tool_calls, 20 + 200);
     let calls = played.calls("move_wrists");
     assert_eq!((calls.len(), &calls[0]["steps"]), (200, &5.into()));
@@ -115,7 +115,7 @@ fn a_policy_may_tell_where_wrists_are_to_be() {
         let turned = PALM_DOWN_ROWS.iter().zip(&wrist[3..]).all(|(goal, at)| (goal - at).abs() < 0.1);
         assert!(off_m < 0.02 && turned, "{off_m} m, {wrist:?}");
     }
-    // The fingers have closed. The other arm, which no key commands, has kept its joints.
+    // The fingers have closed. The other arm, which no key commands, has kept its joint angles.
     assert!((played.angle_rad(41, 1000) - CLOSED[5]).abs() < 0.2, "{}", played.angle_rad(41, 1000));
     assert!((played.angle_rad(18, 1000) - played.angle_rad(18, 1)).abs() < 0.03);
 }
@@ -130,7 +130,7 @@ rows = 15
 rate_hz = 15
 delta = ["left_wrist_yaw_joint"]
 "#;
-/// Index of this joint among the columns of a row, and among the joints of a state.
+/// Index of the left wrist yaw joint among the columns of a row; `WRIST_JOINT` is its index in a state.
 const WRIST_COLUMN: usize = 6;
 const WRIST_JOINT: usize = 21;
 
@@ -144,8 +144,8 @@ fn a_policy_may_tell_differences_at_its_own_rate() {
     assert_eq!(interpolated.episode.result.tool_calls, 40, "a second, fifty control steps, is one command");
     let last_rad = interpolated.angle_rad(WRIST_JOINT, 1000);
     assert!((last_rad - 0.9).abs() < 0.03, "{last_rad}");
-    // Fifteen rows in fifty control steps, evenly. The first row's target is the measured angle plus
-    // 0.02, reached in steps of 20 ms.
+    // Fifteen rows are spread evenly over fifty control steps. The first row's target is the measured angle
+    // plus 0.02 rad, reached in steps of 20 ms.
     let targets = |played: &Played| -> Vec<f64> {
         let calls = played.calls("send_joint_chunk");
         let rows = calls[1]["robots"][0]["rows"].as_array().expect("rows");
@@ -187,7 +187,8 @@ fn a_policy_may_see_two_moments() {
         let way = if now > 0.5 || now > -0.5 && now < before { -0.05 } else { 0.05 };
         (1..=16u8).map(|row| vec![now + way * f32::from(row)]).collect()
     });
-    // One observation at each request, and one before the next request, a row of five control steps earlier.
+    // One observation is made at each request, and another one row (five control steps) before the next
+    // request.
     assert_eq!(played.asked.len(), 25);
     assert_eq!(played.calls("observe").len(), 25 + 25);
     assert_eq!(

@@ -9,7 +9,8 @@ use std::{
 use rmpv::Value;
 use tungstenite::{Message, WebSocket};
 
-/// Returns the reply to a request, from its number on this connection (counted from 0) and its content.
+/// Function that returns the reply to a request. The arguments are its number on this connection, counted
+/// from 0, and its content.
 pub type Decide = dyn Fn(usize, &Value) -> Reply + Send + Sync;
 
 /// Response of the server.
@@ -20,7 +21,7 @@ pub enum Reply {
     Bytes(Vec<u8>),
     /// Closes the connection.
     Nothing,
-    /// Keeps the connection open and silent while the client is connected.
+    /// Sends nothing and keeps the connection open while the client is connected.
     Silence,
 }
 

@@ -1,4 +1,4 @@
-//! Tests of agents as programs. The program is this test's own binary, started again to run `agent` below.
+//! Tests of agents as programs. The program is this test binary, started again to run `agent` below.
 
 use std::{env, fs, io::Read, path::Path, time::Duration};
 
@@ -59,7 +59,7 @@ fn agent() {
         Ok("crash") if env::var("TANDEM_ROBOT").as_deref() != Ok("A") => {
             panic!("the planner has no plan");
         }
-        // The partner of a program that crashes later; this one leaves early.
+        // The partner of a program that crashes later. This partner exits early.
         Ok("leave_partner") if env::var("TANDEM_ROBOT").as_deref() == Ok("A") => {}
         Ok("leave_partner") => {
             tool("wait", json!({ "steps": 5 })).expect("it waits alone");
@@ -231,7 +231,7 @@ fn a_program_that_crashes_is_listed_apart_and_played_again() {
         let recorded = folder.path().join("episodes/handover-1/result.json");
         assert!(fs::read_to_string(recorded).expect("a result").contains("\"policy_failed\""));
 
-        // With `retries: 0` the failed episodes count, and none of them is played again.
+        // With `retries: 0` the failed episodes count, and no episode is played again.
         let kept = play(&EvaluationPlan { retries: 0, ..plan.clone() }, folder.path());
         assert_eq!((kept.tasks["handover"].episodes, kept.tasks["handover"].policy_failed), (2, 0));
         let hashes = |evaluation: &Evaluation| {
@@ -263,7 +263,7 @@ fn a_crash_of_one_of_two_programs_is_named() {
     }
 }
 
-/// Checks the result of an episode in which B's program crashes, with A's in this role.
+/// Checks the result of an episode in which B's program crashes and A's program has this role.
 fn check_named_crash(role: &str) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let driving = Driving { operators: Some(Operators::PerRobot), patience_s: Some(1.0), talk: None };

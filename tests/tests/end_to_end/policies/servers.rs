@@ -1,5 +1,5 @@
-//! Tests of learned policies on working servers: their observations, and that the robots execute their
-//! responses.
+//! Tests of learned policies on working servers: the observations that they receive, and the execution of
+//! their responses by the robots.
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Mutex};
 
@@ -14,12 +14,12 @@ use super::{
     plans::{last_angles_rad, plan, play},
 };
 
-/// Index of the wrists' last joints among the 43 of a state.
+/// Indices of the wrists' last joints among the 43 joints of a state.
 const LEFT_WRIST: usize = 21;
 const RIGHT_WRIST: usize = 35;
-/// Words in A's instruction only.
+/// Words that occur only in A's instruction.
 const WORDS_OF_A: &str = "Take the bottle";
-/// Index of the same joints in an action row.
+/// Indices of the same joints in an action row.
 pub const LEFT_WRIST_COLUMN: usize = 6;
 const RIGHT_WRIST_COLUMN: usize = 13;
 
@@ -30,8 +30,8 @@ pub fn map(folder: &Path, text: &str) -> PolicyMap {
     PolicyMap::find(&path.display().to_string()).expect("a map")
 }
 
-/// Returns a policy that keeps every robot at its first measured state, except for one wrist. Its column
-/// and angle follow from the instruction.
+/// Returns a policy that keeps every robot at its first measured state, except for one wrist joint. The
+/// function `wrist` maps the instruction to the joint's column and angle.
 pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, rows: usize) -> Box<Decide> {
     // Robots are distinguished by their instructions.
     let first: Mutex<BTreeMap<String, Vec<f32>>> = Mutex::default();
@@ -39,7 +39,7 @@ pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, row
         let state = floats(request, "observation/state");
         let words = entry(request, "prompt").as_str().expect("a text");
         let mut first = first.lock().expect("no panic");
-        // The first request is a trial without a robot.
+        // The first request is a trial that belongs to no robot.
         let state = if number == 0 { state } else { first.entry(words.into()).or_insert(state).clone() };
         let groups = [15..22, 29..36, 22..29, 36..43, 12..15];
         let mut row: Vec<f32> = groups.into_iter().flat_map(|group| state[group].to_vec()).collect();
@@ -70,7 +70,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
     assert_eq!((played.result.ended, played.result.env_steps), (EndReason::StepBudgetExhausted, 1000));
-    // Twenty observations, and a command for each.
+    // Twenty observations, each followed by a command.
     assert_eq!(played.result.tool_calls, 40);
     assert_eq!(
         (&*played.policy.name, played.policy.extra_information.len()),
@@ -83,7 +83,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     near(LEFT_WRIST, 0, 0.3);
     near(RIGHT_WRIST, 1, 0.5);
 
-    // One trial with black images, then twenty requests for each robot, in which A's measured wrist turns.
+    // One trial with black images, then twenty requests for each robot. A's measured wrist turns meanwhile.
     let requests = server.requests.lock().expect("no panic");
     assert_eq!(requests.len(), 41);
     let bright = |request: &Value| {
@@ -127,7 +127,7 @@ fn each_robot_may_have_a_policy_of_its_own() {
     );
 }
 
-/// Map of a policy that directs both robots and sees the room.
+/// Policy map of a policy that directs both robots and receives images from the camera in the room.
 const CENTRAL: &str = r#"
 preset = "openpi"
 scope = "global"

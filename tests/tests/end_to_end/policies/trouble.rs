@@ -1,5 +1,5 @@
-//! Tests of learned policies on failing servers: each failure ends its own episode only, and the result
-//! includes the reason.
+//! Tests of learned policies on failing servers: each failure ends only the episode in which it occurs, and
+//! the result includes the reason.
 
 use std::{thread, time::Duration};
 
@@ -18,7 +18,7 @@ use super::{
 
 const FAST: &str = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 5.0\n";
 
-/// Holds still for the trial and the first three responses, then acts as `then`.
+/// Returns a policy that holds still for the trial and the first three responses, then replies with `then`.
 fn until_then(then: impl Fn() -> Reply + Send + Sync + 'static) -> Box<Decide> {
     let hold = still(20);
     Box::new(move |number, request| if number < 4 { hold(number, request) } else { then() })
@@ -130,7 +130,7 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
         assert!(text.contains("run the same command again: of 4 episodes 0 are played and kept"), "{text}");
     }
 
-    // Observers of the run learn the reason for its wait.
+    // The progress of the run includes the reason for its wait.
     let slow = PolicyMap { connect_s: 1.5, ..fast.clone() };
     let url = format!("ws://{}", nowhere());
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![url.clone()], slow);
@@ -146,7 +146,7 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
     let told = told.map(|wait| wait.to_string()).unwrap_or_default();
     assert!(told.starts_with(&format!("waiting for {url}, ")), "{told}");
 
-    // A server that leaves after two episodes and returns.
+    // A server that stops after two episodes and is started again.
     let address = nowhere();
     let short = OpenpiServer::start_at(address, 2, |_| still(50));
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![short.url()], fast.clone());
@@ -183,7 +183,7 @@ fn what_a_server_behind_act_refuses_is_told() {
     }
 }
 
-/// Response of nginx without an upstream server.
+/// Error page of nginx without an upstream server.
 const PAGE: &str =
     "<html>\r\n<head><title>502 Bad Gateway</title></head>\r\n<body>\r\n</body>\r\n</html>\r\n";
 
@@ -199,7 +199,7 @@ fn a_page_in_html_is_shown() {
         let policy = RemotePolicy::new(protocol, vec![url], map(folder.path(), FAST));
         match evaluate(&plan(&policy, vec![1], false), folder.path(), &|_| {}) {
             Ok(evaluation) => evaluation.left_out.join(", "),
-            // Such a page may mean that there is no server at all.
+            // This page may mean that no policy server is running.
             Err(error) => error.to_string(),
         }
     };

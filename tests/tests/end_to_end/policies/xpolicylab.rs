@@ -1,4 +1,5 @@
-//! Tests of a policy behind XPolicyLab's frames: its observations, and that the robots execute its responses.
+//! Tests of a policy that communicates in XPolicyLab's frames: its observations, and the execution of its
+//! responses by the robots.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -20,8 +21,8 @@ use super::{
     xpolicylab_server::{XPolicyLabServer, floats, map, read_floats},
 };
 
-/// Index of the left wrist's last joint among the 43 of a state; `LAST_OF_ARM` is its index among the 7
-/// of an arm.
+/// Index of the left wrist's last joint among the 43 joints of a state; `LAST_OF_ARM` is its index among the
+/// 7 joints of an arm.
 const LEFT_WRIST: usize = 21;
 const LAST_OF_ARM: usize = 6;
 const ROWS: usize = 50;
@@ -61,7 +62,7 @@ fn an_xpolicylab_policy_is_asked_trial_by_trial() {
     let turned_rad = last_angles_rad(folder.path(), "handover-1", LEFT_WRIST)[0];
     assert!((turned_rad - 0.3).abs() < 0.03, "{turned_rad}");
 
-    // A trial with zeros, from which the model is reset, then twenty observations of each of two robots.
+    // A trial with zeros, after which the model is reset, then twenty observations of each of two robots.
     let mut expected = vec!["hello", "prepare_case", "reset", "infer", "trial_end", "reset"];
     expected.extend(["infer"; 40]);
     expected.extend(["trial_end", "close"]);
@@ -87,7 +88,8 @@ fn an_xpolicylab_policy_is_asked_trial_by_trial() {
     assert_ne!(trial, entry(&frames[3], "trial_id"), "the trial with zeros is another");
 }
 
-/// A's server has responded when B's starts to think. B's continues until A's has received a heartbeat.
+/// B's server begins to compute after A's server has responded, and continues until A's server has received a
+/// heartbeat.
 #[test]
 fn a_server_that_has_answered_hears_heartbeats_while_another_thinks() {
     let (first_of_a, first_of_b) = (Mutex::default(), Mutex::default());

@@ -11,7 +11,7 @@ use tungstenite::Message;
 
 use super::openpi_server::entry;
 
-/// Returns the response to an observation, or an error.
+/// Function that returns the response to an observation, or an error.
 pub type Infer = dyn Fn(&Value) -> Result<Value, &'static str> + Send + Sync;
 
 /// A server that runs until the test ends.
@@ -43,7 +43,7 @@ impl XPolicyLabServer {
         format!("ws://{}", self.address)
     }
 
-    /// Returns the types of the messages, in order.
+    /// Returns the types of the received messages, in order.
     pub fn asked(&self) -> Vec<String> {
         let frames = self.frames.lock().expect("no panic");
         frames.iter().map(|frame| entry(frame, "message_type").as_str().expect("a text").to_owned()).collect()
@@ -79,7 +79,7 @@ fn serve(stream: TcpStream, infer: &Infer, heard: &Mutex<Vec<Value>>) {
             rmpv::encode::write_value(&mut bytes, &answer).expect("memory");
             Message::binary(bytes)
         };
-        // The client must ignore responses to other messages, and messages that are no frames.
+        // The client must ignore responses to other messages, and messages that are not frames.
         let _ = socket.send(of("another".into()));
         let _ = socket.send(Message::text("hello"));
         // The client may have closed the connection.
@@ -105,7 +105,7 @@ pub fn floats(values: &[f32]) -> Value {
     ])
 }
 
-/// Returns the floats of such an array.
+/// Returns the floats of an array in this format.
 pub fn read_floats(array: &Value) -> Vec<f32> {
     assert_eq!((entry(array, "nd"), entry(array, "type").as_str()), (&Value::from(true), Some("<f4")));
     let (bytes, _) = entry(array, "data").as_slice().expect("bytes").as_chunks::<4>();

@@ -1,5 +1,5 @@
 //! Tests of assistance in all texts that reach a policy: replies over REST and MCP, replies to operators,
-//! observations after commands, briefs, prompts, and the texts of tools. They contain the benchmark's
+//! observations after commands, briefs, prompts, and the texts of tools. These contain only the benchmark's
 //! information, or all information.
 
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use tandem::settings::Layer;
 use tandem_tests::TestServer;
 use tandem_tools_spec::{Assistance, Format};
 
-/// Fields that only `full` has.
+/// Fields that occur only under `full`.
 const FULL_FIELDS: [&str; 12] = [
     "joint_velocities_rad_s",
     "joint_torques_n_m",
@@ -20,11 +20,11 @@ const FULL_FIELDS: [&str; 12] = [
     "state",
     "odometry",
     "grasping",
-    // A task's field about scoring.
+    // Field of a task about its scoring.
     "collaborative",
 ];
 
-/// Words about information that only `full` gives.
+/// Words about information given only under `full`.
 const FULL_WORDS: [&str; 8] = [
     "torques",
     "fallen",
@@ -45,7 +45,7 @@ fn full_fields(reply: &Value) -> Vec<&'static str> {
     let mut found: Vec<&'static str> = match reply {
         Value::Object(object) => {
             let own = FULL_FIELDS.into_iter().filter(|field| object.contains_key(*field));
-            // A result names the information given, with counts.
+            // A result lists the information that was given, with counts.
             let inner = object.iter().filter(|(name, _)| *name != "extra_information_replies");
             own.chain(inner.flat_map(|(_, value)| full_fields(value))).collect()
         }

@@ -1,5 +1,5 @@
-//! Tests of bad input: each call is refused with a hint at a valid one, the state hash is unchanged, and
-//! the episode continues.
+//! Tests of bad input: each call is refused with a hint at a valid call, the state hash is unchanged, and the
+//! episode continues.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
@@ -18,7 +18,7 @@ fn wrist(field: &str, value: Value) -> Value {
     json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] })
 }
 
-/// Returns calls with their tool, arguments and status, and the texts that the refusal must contain.
+/// Returns invalid calls: tool, arguments, expected status, and the texts that the refusal must contain.
 fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
     vec![
         ("grasp", json!({}), 404, &["\"grasp\"", "observe", "move_wrists", "send_joint_chunk"]),
@@ -48,8 +48,8 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
     ]
 }
 
-/// Returns bodies that are no calls, with their content type, bytes and status, and the texts that the
-/// refusal must contain.
+/// Returns bodies that are not calls: content type, bytes, expected status, and the texts that the refusal
+/// must contain.
 fn refused_bodies() -> Vec<(&'static str, Vec<u8>, u16, &'static [&'static str])> {
     let json = "application/json";
     vec![

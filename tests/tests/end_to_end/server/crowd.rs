@@ -1,4 +1,5 @@
-//! Tests of many clients at once, and of clients over their limits: each gets a response, or a time to retry.
+//! Tests of many simultaneous clients, and of clients over their limits. Each receives a response, or a time
+//! to retry.
 
 use std::{
     thread,

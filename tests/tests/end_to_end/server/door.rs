@@ -39,7 +39,7 @@ fn header<'a>(answer: &'a str, name: &str) -> &'a str {
 
 const JSON: &str = "content-type: application/json";
 
-/// A request to every route, with a body if it reads one. The episode is the first of seed 0.
+/// A request to every route, with a body if the route reads one. The episode is the first with seed 0.
 const REQUESTS: [(&str, &str); 15] = [
     ("GET /healthz", ""),
     ("GET /metrics", ""),

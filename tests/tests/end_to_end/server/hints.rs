@@ -1,5 +1,5 @@
-//! Tests of hints: the server's texts for policies, and the recording, include instructions on grasping
-//! only with hints.
+//! Tests of hints: the server's texts for policies include instructions on grasping only with hints, and so
+//! does the recording.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;

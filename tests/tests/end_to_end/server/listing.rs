@@ -16,7 +16,7 @@ fn ids(list: &Value) -> Vec<&str> {
         .collect()
 }
 
-/// Returns the response to a caller with this token, as text.
+/// Returns the status and the text of the response to a caller with this token.
 fn asked(server: &TestServer, token: &str, path: &str) -> (u16, String) {
     let bearer = format!("Bearer {token}");
     let (status, _, bytes) = server.ask(
@@ -103,7 +103,7 @@ fn who_has_a_token_sees_its_own_episodes() {
     assert!(![own, team_id, operator, TOKEN].iter().any(|text| pages[0].1.contains(text)), "{pages:?}");
 }
 
-/// A language model reads pages with a program that does not ask for HTML.
+/// Language models read pages with programs that do not request HTML.
 #[test]
 fn who_asks_for_no_page_gets_a_few_lines() {
     let server = TestServer::start();
@@ -118,7 +118,7 @@ fn who_asks_for_no_page_gets_a_few_lines() {
             assert_eq!(headers["content-type"], "text/plain; charset=utf-8");
         }
     }
-    // It redirects to the description, and the client follows.
+    // The path redirects to the description, and the client follows the redirect.
     assert_eq!(server.get("/openapi.json").ok(), server.get("/v1/openapi.json").ok());
 }
 

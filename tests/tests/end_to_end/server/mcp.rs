@@ -1,4 +1,5 @@
-//! Tests of the MCP route from a host's side: JSON-RPC over HTTP, with images as separate blocks.
+//! Tests of the MCP route from the side of a host: JSON-RPC over HTTP, with images as separate content
+//! blocks.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;
@@ -82,8 +83,8 @@ fn is_of_type(value: &Value, schema: &Value) -> bool {
     }
 }
 
-/// Clients that ask for it get schemas of replies, and the replies as values that fit them. A model would read
-/// both, so all other clients get neither.
+/// Clients that request it receive schemas of replies, and the replies as values that match them. All other
+/// clients receive neither, because a model would read both.
 #[test]
 fn structured_content_fits_its_schema() {
     let server = TestServer::with(Layer { max_episodes: Some(4), ..Layer::default() });
@@ -144,7 +145,7 @@ fn structured_content_fits_its_schema() {
     assert!(seen.get("structuredContent").is_none() && seen["content"][2]["type"] == "image");
 }
 
-/// Images may come as links, over HTTP and MCP, for the callers who could see them inline.
+/// Images may be sent as links, over HTTP and MCP, to the callers who may see them inline.
 #[test]
 fn images_may_be_links() {
     let server = TestServer::start();

@@ -1,5 +1,5 @@
-//! Tests for administrators of a server: metrics, the page of the interface, and the tools in every
-//! host's format.
+//! Tests of a server's functions for administrators: metrics, the page that documents the interface, and the
+//! tools in every host's format.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;

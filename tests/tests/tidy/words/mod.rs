@@ -1,12 +1,12 @@
-//! Tests of the words of comments and names: an editor's English.
+//! Tests of the wording of comments and names.
 
 use syn::visit::{self, Visit};
 
 use super::sources::{Source, everywhere, expect_none};
 
-/// First words of comments that ask a question instead of describing the item.
+/// Question words, with which no comment may begin.
 const QUESTIONS: [&str; 9] = ["What", "Where", "Who", "Whether", "Of", "As", "How", "Which", "Whose"];
-/// Columns of a line with a comment.
+/// Maximum length of a line with a comment, in columns.
 const MAX_COMMENT_COLUMNS: usize = 112;
 
 /// Returns the first line of every doc comment, with its number.
@@ -38,7 +38,7 @@ fn comments_begin_with_what_there_is() {
     );
 }
 
-/// Functions whose comments do not begin with a verb in the third person.
+/// Collector of functions whose comments do not begin with a verb in the third person.
 struct Functions {
     path: String,
     found: Vec<String>,
@@ -118,10 +118,10 @@ fn comments_fit_their_lines() {
     expect_none(&found, &format!("comments have at most {MAX_COMMENT_COLUMNS} columns"));
 }
 
-/// Ways in which an example begins after a bare "as": a JSON value, a quotation, or a command line's value.
+/// Forms of examples introduced by a bare "as": a JSON value, a quotation, or a command-line value.
 const EXAMPLES: [&str; 6] = [", as [[", ", as {", ", as \\\"", ", as agent:", ", as act:", ", as B="];
 
-/// Texts that callers and users read, in errors, help and comments.
+/// The test covers texts that callers and users read, in errors, help and comments.
 #[test]
 fn examples_are_named_as_examples() {
     let mut found = Vec::new();

@@ -7,23 +7,24 @@ use tandem_sim::body::{
 };
 use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
 
-/// Offset of the targets of arms, waist and fingers. Nothing corrects it, because no robot knows the pose
-/// of the load or of the others.
+/// Offset of the targets of arms, waist and fingers. Nothing corrects it, because no robot measures the pose
+/// of the load or of its teammates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ArmDisturbance {
     None,
-    /// Offset of both shoulders' pitch of every robot, reached within a second, rad. With negative values,
-    /// hands press towards the load ahead.
+    /// Offset (rad) of every robot's shoulder pitch joints, reached within a second. With negative values,
+    /// the hands press towards the load ahead.
     Shoulders(f32),
-    /// This offset with the opposite sign for every second robot: all hands move the load in one direction.
+    /// The same offset with the opposite sign for every second robot: all hands push the load in one
+    /// direction.
     OneWay(f32),
-    /// Normal noise of this deviation (rad) on arms and waist, drawn anew five times a second.
+    /// Normal noise with this standard deviation (rad) on arms and waist, redrawn five times a second.
     Noise(f32),
     /// The hands of the last robot open.
     LastOpens,
 }
 
-/// Time within which targets move to their disturbed values.
+/// Time in which targets move to their disturbed values.
 const COMES_S: f32 = 1.0;
 const NOISE_STEPS: u32 = 10;
 

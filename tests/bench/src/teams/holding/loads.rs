@@ -1,4 +1,4 @@
-//! Shared loads of the bench, and the way in which teams take them.
+//! Shared loads of the bench, and the grasps of the teams that hold them.
 
 use std::f32::consts::PI;
 
@@ -16,17 +16,17 @@ use tandem_sim::{Pose, Vector};
 
 use crate::teams::carrying;
 
-/// An object that a team holds. The team takes it from the start of the task that has the object.
+/// An object held by a team, which grasps it at the start of the task that contains the object.
 pub(in crate::teams) struct SharedLoad {
     pub name: &'static str,
     pub object: &'static str,
-    /// Robot, its two places on the object, and its heading in the object's frame.
+    /// Each robot, its two grasp points on the object, and its heading in the object's frame.
     holders: &'static [(usize, [&'static str; 2], f32)],
     hold: &'static Hold,
     /// True if hands reach out while their robots walk to the object, for example to the legs of a table.
     reaching: bool,
-    /// Height of the pelvis over the floor while the object is taken, and while it is held; `None` does not
-    /// change it.
+    /// Height of the pelvis above the floor while the object is grasped, and while it is held. `None` keeps
+    /// the current height.
     pelvis_m: Option<[f32; 2]>,
     lift_m: f32,
     /// Displacement of the object when it is carried: x and y in the world frame.
@@ -113,7 +113,7 @@ impl SharedLoad {
         self.holders.iter().map(|(robot, ..)| *robot)
     }
 
-    /// Takes the object and lifts it. With `carried`, the robots then walk a short way with the object.
+    /// Grasps the object and lifts it. With `carried`, the robots then walk a short distance with the object.
     pub(in crate::teams) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
         self.with_team(episode, |commander, team| {
             if !carried {
@@ -129,7 +129,7 @@ impl SharedLoad {
         })
     }
 
-    /// Takes the object, lifts it, and calls `then`.
+    /// Grasps the object, lifts it, and calls `then`.
     pub(in crate::teams) fn with_team(
         &self,
         episode: &mut InProcess,

@@ -1,19 +1,20 @@
-//! Drift of a team that was commanded to stand, and of its load.
+//! Drift of a team that was commanded to stand, and drift of its load.
 
 use std::collections::VecDeque;
 
 use tandem_sim::{CONTROL_HZ, Step, Vector};
 
-/// Figures of a team without a fall.
+/// Measurements of a team in which no robot fell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct HoldResult {
-    /// Largest horizontal distance of a pelvis from its place at the command to stand, or to set down.
+    /// Largest horizontal distance of a pelvis from its position at the command to stand, or to set the
+    /// object down.
     pub drift_m: f32,
-    /// The same distance, from its place [`RESTS_AFTER_S`] after the command.
+    /// The same distance from the position [`RESTS_AFTER_S`] after the command.
     pub late_drift_m: f32,
-    /// The same distance of the point at which the object is held, averaged over each second.
+    /// The same distance for the point at which the object is held, averaged over each second.
     pub load_drift_m: f32,
-    /// Time at which the last robot stood for good.
+    /// Time after which all robots kept standing.
     pub standing_after_s: f32,
     /// Largest tilt of the object's vertical axis.
     pub tilt_deg: f32,
@@ -25,15 +26,15 @@ pub(super) struct HoldResult {
 const RESTS_AFTER_S: f32 = 1.5;
 const MEAN_STEPS: usize = CONTROL_HZ as usize;
 
-/// Accumulator of the figures, control step by control step.
+/// Accumulator of the measurements, updated each control step.
 pub(super) struct HoldMeasure<'a> {
     object: &'a str,
     team: &'a [usize],
     steps: u32,
     began_m: Vec<Vector>,
     rested_m: Vec<Vector>,
-    /// Midpoint of the wrists at the command to stand, in the object's frame. A point further below would
-    /// also measure the swing of a table.
+    /// Midpoint of the wrists at the command to stand, in the object's frame. A lower point would also
+    /// measure the swing of a table.
     held_in_object_m: Vector,
     load_m: VecDeque<Vector>,
     load_rested_m: Option<Vector>,
@@ -42,8 +43,8 @@ pub(super) struct HoldMeasure<'a> {
 }
 
 impl<'a> HoldMeasure<'a> {
-    /// Begins at the step of the command to stand. `began_m` are the places of the pelvises from which
-    /// drift is measured, if they differ from those of `begin`.
+    /// Begins at the step of the command to stand. `began_m` has the pelvis positions from which drift is
+    /// measured, if they differ from the positions in `begin`.
     pub(super) fn new(
         begin: &Step,
         object: &'a str,
@@ -101,7 +102,7 @@ impl<'a> HoldMeasure<'a> {
         }
     }
 
-    /// Returns the figures; `None` if a robot fell.
+    /// Returns the measurements, or `None` if a robot fell.
     pub(super) fn held(self) -> Option<HoldResult> {
         let power_w = self.held.power_w / self.steps.max(1) as f32;
         (!self.fell).then_some(HoldResult { power_w, ..self.held })
@@ -121,7 +122,7 @@ fn pelvises_m(step: &Step, team: &[usize]) -> Vec<Vector> {
     team.iter().map(|robot| step.robots[*robot].truth.world_from_pelvis().translation).collect()
 }
 
-/// Returns the largest horizontal distance of these points from their partners.
+/// Returns the largest horizontal distance between corresponding points.
 fn farthest_m(at_m: &[Vector], from_m: &[Vector]) -> f32 {
     at_m.iter().zip(from_m).map(|(at, from)| (*at - *from).truncate().length()).fold(0.0, f32::max)
 }

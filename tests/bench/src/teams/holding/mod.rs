@@ -1,8 +1,9 @@
-//! Teams that hold an object together and are commanded to stand: cases of the bench of base controllers that
-//! need hands.
+//! Cases of the bench of base controllers in which teams hold an object together and are commanded to stand.
+//! They require hands.
 //!
-//! They take an object like the experts do, lift it and, in some cases, walk a short way with it. Then all
-//! bases are commanded to stand and all arms to keep their posture, except for the case's disturbance.
+//! The teams grasp an object with the experts' skills, lift it and, in some cases, walk a short distance with
+//! it. Then all bases are commanded to stand and all arms to keep their posture, except for the case's
+//! disturbance.
 
 mod disturbance;
 pub(super) mod loads;
@@ -29,7 +30,7 @@ use measure::{HoldMeasure, HoldResult};
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Before {
     Lifts,
-    /// Lifts the object and walks a short way with it: the team is commanded to stand while it walks.
+    /// Lifts the object and walks a short distance with it. The team is commanded to stand while it walks.
     Carries,
     /// Lowers the targets of the first robot's hands by this distance.
     LowersOne(f32),
@@ -37,20 +38,20 @@ enum Before {
     SetsDown(f32),
 }
 
-/// A team's load, its action, and the load's mass.
+/// A team's load, the load's mass, and the team's action before the command to stand.
 #[derive(Clone, Copy)]
 struct Setup {
     load: &'static SharedLoad,
     before: Before,
-    /// `None` for the mass in the object's file.
+    /// Mass of the load per robot. `None` keeps the mass in the object's file.
     robot_share_kg: Option<f32>,
 }
 
 const HOLDS_S: f32 = 6.0;
 const LOWERING_S: f32 = 1.0;
 
-/// Returns the setups, and the cases of each: the end of the case's name, and its disturbance. All cases of a
-/// setup continue from the same episode up to the command.
+/// Returns each setup with its cases: the suffix of the case's name, and its disturbance. All cases of a
+/// setup branch from the same episode at the command to stand.
 fn setups() -> Vec<(Setup, Vec<(&'static str, ArmDisturbance)>)> {
     use ArmDisturbance::{LastOpens, Noise, None as Undisturbed, OneWay, Shoulders};
     let mut setups = Vec::new();
@@ -146,8 +147,8 @@ impl Setup {
         })
     }
 
-    /// Returns the result of each disturbance, all from the same moment. It is `None` for a team that fell,
-    /// or did not come to hold the object.
+    /// Returns the result of each disturbance, all applied from the same state. A result is `None` if a robot
+    /// fell, or the team did not grasp the object.
     fn trials(
         &self,
         spec: &EpisodeSpec,
@@ -184,8 +185,8 @@ impl Setup {
         Ok(outcomes)
     }
 
-    /// Plays up to the command to stand. Returns the places of the pelvises when the team began to set the
-    /// object down; `None` if it did not.
+    /// Plays up to the command to stand. Returns the pelvis positions at the moment when the team began to
+    /// set the object down, or `None` if the case does not set it down.
     fn begin(&self, episode: &mut InProcess, team: &[usize]) -> Result<Option<Vec<Vector>>, PlayerError> {
         match self.before {
             Before::Lifts => self.load.take(episode, false)?,
@@ -231,8 +232,8 @@ fn standing(session: &Session) -> Vec<RobotCommand> {
 mod tests {
     use super::*;
 
-    /// Limits: the drift of pelvises and of loads once a team has had 1.5 s to stop, and the time until the
-    /// last robot stands.
+    /// Limits on the drift of pelvises and loads from 1.5 s after the command, and on the time until the last
+    /// robot stands.
     const MAX_SWAY_M: f32 = 0.03;
     const MAX_LOAD_DRIFT_M: f32 = 0.02;
     const MAX_STANDING_AFTER_S: f32 = 1.5;
