@@ -145,10 +145,10 @@ class PixelRegion:
     """Pixels of a rectangle at a stride, beginning at `from`."""
 
     from_: Numbers
-    """Its top left pixel [u, v], as [100, 80]."""
+    """Top left [u, v], such as [100, 80]."""
 
     to: Numbers
-    """Its bottom right one, as [220, 170]."""
+    """Bottom right, such as [220, 170]."""
 
     stride: int
     """10: every tenth pixel across and down. Each is 30 bytes of the reply."""

@@ -59,13 +59,13 @@ StopReason: TypeAlias = Literal[
     "step_budget_exhausted",
     "partner_done",
 ]
-"""Why a command ended."""
+"""End of a command."""
 
 Touch: TypeAlias = Literal[
     "itself",
     "something",
 ]
-"""Contact of a hand, as far as it can feel that."""
+"""Contact that a hand can feel."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,18 +99,18 @@ class BaseReport(Reply):
     """Commanded height, where the measured one is more than 2 cm off; left out otherwise."""
 
     comes_to_rest_m: tuple[float, float] | None = None
-    """Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: to within
-    3 cm after a walk of up to 2.5 s, 5 cm after a longer one. Only of a base that steps or settles.
+    """Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: within 3
+    cm after a walk of up to 2.5 s, 5 cm after a longer one. Only for a base that steps or settles.
     """
 
     displaced_m: tuple[float, float] | None = None
-    """Displacement of a base that was commanded to stand from its resting place, [forward, left] in metres as it
-    faced there: something pulled or pushed it. Left out below 2 cm.
+    """Displacement from its resting place of a base commanded to stand, [forward, left] in metres by its heading
+    there: something pulled or pushed it. Left out below 2 cm.
     """
 
     stepped: bool | None = None
-    """True where it took a step during the command though it was commanded to stand, after arms that reach far or
-    what pulls at them; left out otherwise.
+    """True if it stepped though commanded to stand, because its arms reached far or were pulled; left out
+    otherwise.
     """
 
 
@@ -122,33 +122,32 @@ class Budget(Reply):
     """Control steps of 20 ms."""
 
     wall_clock_left_s: float | None = None
-    """Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null where
-    the protocol sets no limit.
+    """Seconds that the policy may still spend between calls; the simulator's time is not counted. Null where the
+    protocol sets no limit.
     """
 
     steps_per_command: int
-    """The most steps that one command may ask for."""
+    """Maximum number of steps per command."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CommandReply(Reply):
-    """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are told to the
-    millimetre, angles and quaternions to a thousandth. What is marked so is left out where the call asked for a
-    short reply.
+    """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are rounded to a
+    millimetre, angles and quaternions to a thousandth. Marked fields are left out of a short reply.
     """
 
     executed_steps: int
     """Control steps of 20 ms that were executed."""
 
     stop_reason: StopReason
-    """Why the command ended."""
+    """Reason for its end."""
 
     time_s: float
     """Simulated seconds since the episode began."""
 
     robots: tuple[RobotReport, ...]
-    """One report per robot that the command named; after `wait`, one per robot of the episode. In a short reply
-    without robots that stand where they stood, whose hands have no target and feel nothing.
+    """One report per robot that the command named; after `wait`, per robot of the episode. A short reply omits
+    robots that have not moved and whose hands have no target and feel nothing.
     """
 
     fallen: tuple[RobotFallen, ...] = ()
@@ -186,10 +185,10 @@ class FingerReport(Reply):
     """State against their targets; left out where the assistance is "paper"."""
 
     target_rad: tuple[float, float, float, float, float, float, float] | None = None
-    """Joint angles that were asked for, in radians. Left out of a short reply."""
+    """Commanded joint angles in radians. Left out of a short reply."""
 
     measured_rad: tuple[float, float, float, float, float, float, float]
-    """Joint angles that were measured, in radians."""
+    """Measured joint angles in radians."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,19 +207,18 @@ class HandReport(Reply):
     """
 
     touches: Touch | None = None
-    """Obstacle that the hand feels; left out where it feels none, of a short reply where `grip` tells it, and
-    where the assistance is "paper".
+    """Obstacle that the hand feels; left out where it feels none, of a short reply if `grip` says so, and where
+    the assistance is "paper".
     """
 
     target: Pose | None = None
-    """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
-    since; of an arm without a wrist target, the pose that its joint targets stand for. Left out of a short
-    reply.
+    """Commanded wrist pose in the present pelvis frame, without later yielding; for an arm without a wrist target,
+    the pose of its joint targets. Left out of a short reply.
     """
 
     measured: Pose | None = None
-    """The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is
-    nearer to the target's. Left out of a short reply where the state is "arrived" or "idle".
+    """Measured wrist pose in the present pelvis frame, its quaternion with the sign nearer to the target's. Left
+    out of a short reply where the state is "arrived" or "idle".
     """
 
     position_error_m: float | None = None
@@ -229,44 +227,40 @@ class HandReport(Reply):
     """
 
     orientation_error_rad: float | None = None
-    """Angle from target to measured, in radians; left out as the distance is."""
+    """Angle from target to measured, in radians; left out like the distance."""
 
     given_way_m: tuple[float, float, float] | None = None
-    """Yielding of the hand by the command's compliance: offset of the yielded target from `target`, [x, y, z] in
-    metres in the pelvis frame, against which its state is reported. Left out where it has not yielded, and
-    where the assistance is "paper".
+    """Offset of the target that compliance has moved from `target`, [x, y, z] in metres in the pelvis frame; its
+    state refers to the moved target. Left out where it has not yielded, and where the assistance is "paper".
     """
 
     fingers: FingerReport | None = None
     """Its fingers; left out of a short reply where they have arrived or the grip is "two_sided"."""
 
     largest_effort: Effort | None = None
-    """The joint of this arm and hand that works hardest; left out of a short reply where it works at less than
-    four fifths of its limit or is of a finger, as of each that presses, and where the assistance is "paper".
+    """Joint of this arm and hand with the largest share of its torque limit; left out of a short reply if that is
+    below 0.8 or of a finger, as of each that presses, and where the assistance is "paper".
     """
 
     force_n: tuple[float, float, float] | None = None
-    """Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a
-    hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What
-    moving the arm takes is not counted; an arm that hangs free may feel up to 5 N of its own friction. Left out
-    of a short reply where it is less than 1 N, of an arm that keeps its joints and holds nothing less than 6 N,
-    and where the assistance is "paper".
+    """External force on the hand in newtons, [x, y, z] in the pelvis frame, by the arm's own joints: about -4.9
+    along z for a held 0.5 kg, a negative x for a hand that presses ahead. Forces that move the arm are
+    excluded; a free arm may feel up to 5 N of its own friction. Left out of a short reply where it is less than
+    1 N, for an arm that keeps its joints and holds nothing less than 6 N, and where the assistance is "paper".
     """
 
     joints_clamped: tuple[str, ...] = ()
-    """Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where there are
-    none.
-    """
+    """Joints of this arm and hand whose target exceeded a limit and was clamped; left out where there are none."""
 
     joints_at_limit: tuple[str, ...] = ()
-    """Joints of this arm that rest at a limit; left out where there are none, and of a short reply where the state
-    is "arrived" or "idle".
+    """Joints of this arm at a limit; left out where there are none, and of a short reply where the state is
+    "arrived" or "idle".
     """
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseReached(Reply):
-    """A phase of the task, and when it was reached."""
+    """A reached phase of the task."""
 
     id: str
     """Name of the phase, for example `grasp_and_lift`."""
@@ -280,7 +274,7 @@ class PhaseReached(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class Pose(Reply):
-    """A pose in the frame that the field which holds it names."""
+    """A pose in the frame that its field names."""
 
     position_m: tuple[float, float, float]
     """[x, y, z] in metres."""
@@ -308,7 +302,7 @@ class RobotReport(Reply):
     """The robot, for example "A"."""
 
     frame: PoseFrame | None = None
-    """The frame of wrist poses: the command's, or that of a walk's places; left out for that of the pelvis."""
+    """Frame of wrist poses, from the command or the walk's targets; left out for the pelvis frame."""
 
     left: HandReport
     """Its left arm and hand."""
@@ -323,13 +317,13 @@ class RobotReport(Reply):
 
     pelvis_in_start: Pose | None = None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
-    pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
+    pelvis at the start of the episode, z up, x along its heading. Drifts by up to 1 % of the distance walked.
     Left out of a short reply where the base has moved by less than a centimetre and a hundredth of a radian,
     but not after `walk_to`, and where the assistance is "paper".
     """
 
     pelvis_in_room: Pose | None = None
-    """The same in the room frame, where `frame` is that; left out otherwise. In a short reply it stands for
+    """The same in the room frame, if that is `frame`; left out otherwise. In a short reply it replaces
     `pelvis_in_start`.
     """
 
@@ -339,12 +333,12 @@ class RobotReport(Reply):
     """
 
     waist_joints_clamped: tuple[str, ...] = ()
-    """Waist joints whose target lay beyond a limit and was moved to it; left out where there are none."""
+    """Waist joints whose target exceeded a limit and was clamped; left out where there are none."""
 
     waist_joints_at_limit: tuple[str, ...] = ()
-    """Waist joints that rest at a limit; left out where there are none."""
+    """Waist joints at a limit; left out where there are none."""
 
     base_command_clamped: tuple[str, ...] = ()
-    """Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`; left
-    out where there are none.
+    """Base command fields that exceeded locomotion's limits and were clamped, for example `vx_m_s`; left out where
+    there are none.
     """

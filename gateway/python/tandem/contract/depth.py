@@ -16,7 +16,7 @@ JoinedBy: TypeAlias = Literal[
     "shape",
     "object",
 ]
-"""By what pixels are joined to a surface. Neighbours are of about the same depth, except of an object."""
+"""Criterion that joins pixels to a surface. Neighbours have about the same depth, except for `object`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,23 +27,23 @@ class DepthReply(Reply):
     """The robot whose camera measured."""
 
     frame: PoseFrame | None = None
-    """The frame of the points, where the call named another than that of the pelvis; left out otherwise."""
+    """Frame of the points, if the call named another than the pelvis; left out otherwise."""
 
     surfaces: tuple[Surface, ...] = ()
-    """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
-    of a colour up to three, the nearest first and what is of the room last; of an object one; of all one for
-    each that is seen. Left out where none was asked for.
+    """The surfaces found: at a pixel, the patch of its colour and, if larger, the whole object; for a colour up to
+    three, the nearest first and parts of the room last; for an object one; for "all" one for each visible
+    object. Left out where none was requested.
     """
 
     fit: RegionFit | None = None
-    """Plane, edges and corners of the region; left out where `fit` was not asked for."""
+    """Plane, edges and corners of the region; left out unless `fit` was requested."""
 
     columns: tuple[str, ...] = ()
     """Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply without points."""
 
     points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...] = ()
-    """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
-    seen, or the camera has no depth. Left out with surfaces or a fit.
+    """One row per requested pixel, in order; a region's row by row. Rounded to 1 mm; null where nothing is seen,
+    or the camera has no depth. Left out with surfaces or a fit.
     """
 
 
@@ -52,13 +52,13 @@ class EdgeFit(Reply):
     """A straight edge at which the plane ends within the region."""
 
     from_m: tuple[float, float, float]
-    """One end of what is seen of it, in metres in the frame of the reply."""
+    """One end of its visible part, in metres in the frame of the reply."""
 
     to_m: tuple[float, float, float]
     """The other end."""
 
     rms_m: float
-    """Root mean square of how far its points are off it, in metres."""
+    """Root mean square distance of its points, in metres."""
 
     points: int
     """Number of points that it was fitted to."""
@@ -72,16 +72,16 @@ class PlaneFit(Reply):
     """The middle of its points, in metres in the frame of the reply."""
 
     normal: tuple[float, float, float]
-    """Unit vector at right angles to it, towards the camera, in that frame."""
+    """Unit normal towards the camera, in that frame."""
 
     rms_m: float
-    """Root mean square of how far its points are off it, in metres."""
+    """Root mean square distance of its points, in metres."""
 
     pixels: int
     """Number of the region's pixels that see it."""
 
     share: float
-    """Their share of those that see anything."""
+    """Their share of the pixels with depth."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,30 +92,30 @@ class RegionFit(Reply):
     """The largest plane."""
 
     edges: tuple[EdgeFit, ...]
-    """Its straight edges, the longest first, up to four. An edge may be where something hides the plane."""
+    """Its straight edges, the longest first, up to four. An edge may be due to occlusion."""
 
     corners_m: tuple[tuple[float, float, float], ...]
-    """Corners, where two of them meet, in metres in the frame of the reply."""
+    """Corners at which two edges meet, in metres in the frame of the reply."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Surface(Reply):
-    """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
+    """The visible part of a surface; of an object only its near side."""
 
     object: str | None = None
-    """The object, where the call asked for all; left out otherwise."""
+    """The object, if the call named "all"; left out otherwise."""
 
     joined_by: JoinedBy
-    """By what its pixels are joined."""
+    """Criterion for its pixels."""
 
     pixels: int
     """Number of its pixels."""
 
     from_: tuple[int, int]
-    """Its top left and bottom right in the picture, as [u, v]."""
+    """Top left of its bounding box, as [u, v]."""
 
     to: tuple[int, int]
-    """See `from`."""
+    """Bottom right."""
 
     rgb: tuple[int, int, int]
     """Its mean colour, [red, green, blue] from 0 to 255."""
@@ -124,29 +124,29 @@ class Surface(Reply):
     """The middle of its area, in metres in the frame of the reply."""
 
     middle_m: tuple[float, float, float]
-    """The middle of its box along the axes of that frame: of a thing that is seen whole, its own."""
+    """Middle of its box along that frame's axes: the object's own if it is fully visible."""
 
     extent_m: tuple[float, float, float]
     """Size of that box along each axis, in metres."""
 
     corners_m: tuple[tuple[float, float, float], ...] = ()
-    """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
-    rectangle its corners. Left out of a short reply where there is an axis, and of all objects.
+    """The four points of its outline that span the largest area in the picture, in the order of the outline: a
+    rectangle's corners. Left out of a short reply with an axis, and for "all".
     """
 
     axis: UprightAxis | None = None
     """Its axis, where it is upright and round; left out otherwise."""
 
     cut_off: bool
-    """True if it goes on beyond the image."""
+    """True if it extends beyond the image."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class UprightAxis(Reply):
-    """The axis of a thing that is upright and round, as a bottle."""
+    """Axis of an upright round object, such as a bottle."""
 
     bottom_m: tuple[float, float, float]
-    """Its lower end as far as that is seen, [x, y, z] in metres in the frame of the reply."""
+    """Its lower visible end, [x, y, z] in metres in the frame of the reply."""
 
     top_m: tuple[float, float, float]
     """Its upper end."""

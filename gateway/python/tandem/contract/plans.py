@@ -25,15 +25,15 @@ class HeldObject(Reply):
     """The object."""
 
     frame: PoseFrame
-    """Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright; after a walk that of its
-    places.
+    """Frame of `middle_m` and `axis`: "level", the upright pelvis frame; after `walk_to`, the frame of its
+    targets.
     """
 
     middle_m: tuple[float, float, float]
     """Middle of the object, [x, y, z] in metres."""
 
     axis: tuple[float, float, float]
-    """Direction of its own z axis, length 1: [0, 0, 1] when it is upright."""
+    """Unit vector along its z axis: [0, 0, 1] if upright."""
 
     lowest_m: float
     """Height of its lowest point above the floor, in metres."""
@@ -44,7 +44,7 @@ class PlanReply(Reply):
     """The reply to `send_plan` and `walk_to`."""
 
     commands: int
-    """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
+    """Executed commands: those listed in a plan, or the short ones of a walk."""
 
     tool_calls: int | None = None
     """Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and each
@@ -52,18 +52,18 @@ class PlanReply(Reply):
     """
 
     executed_steps: int
-    """Control steps of 20 ms that they took together."""
+    """Control steps of 20 ms of these commands."""
 
     stopped: str | None = None
-    """Why no more were; null where all was done."""
+    """Cause of an early stop; null if none."""
 
     outcomes: tuple[str, ...] = ()
-    """A line for each command of a plan that was begun: its steps, and where that left the robots. Left out where
-    there is one command.
+    """A line for each started command of a plan: its steps, and the robots' state after them. Left out for a
+    single command.
     """
 
     held: tuple[HeldObject, ...] = ()
     """Objects in hands after a walk with `carry`, in its frame; left out otherwise."""
 
     last: CommandReply
-    """The reply to the last command that was carried out."""
+    """The reply to the last executed command."""

@@ -34,7 +34,7 @@ EndReason: TypeAlias = Literal[
     "policy_failed",
     "simulator_failed",
 ]
-"""Why an episode has ended."""
+"""End of an episode."""
 
 Protocol: TypeAlias = Literal[
     "agentic",
@@ -45,7 +45,7 @@ Protocol: TypeAlias = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class BaseCommand(Reply):
-    """The base command in force. Velocities are zero between commands; the height persists."""
+    """The present base command. Velocities are zero between commands; the height persists."""
 
     vx_m_s: float
     """Forward velocity in metres per second."""
@@ -63,7 +63,7 @@ class BaseCommand(Reply):
 @dataclass(frozen=True, kw_only=True)
 class CameraCalibration(Reply):
     """A pinhole camera: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v = fy y / z + cy.
-    Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies at u = v =
+    Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre is at u = v =
     0.
     """
 
@@ -106,16 +106,16 @@ class HandReach(Reply):
     """True if it comes within 5 mm and 0.05 rad."""
 
     position_error_m: float
-    """Distance left, in metres."""
+    """Position error in metres."""
 
     orientation_error_rad: float
-    """Angle left, in radians."""
+    """Angle error in radians."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LensDistortion(Reply):
-    """Distortion of a lens after Brown and Conrady: in place of x / z and y / z come x' and y' as OpenCV's
-    `projectPoints` makes them. Points of query_depth are right without further ado.
+    """Brown-Conrady distortion of a lens: OpenCV's `projectPoints` defines x' and y', which replace x / z and y /
+    z. Points of query_depth need no correction.
     """
 
     model: str
@@ -139,7 +139,7 @@ class NextPhase(Reply):
     """Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the phase."""
 
     held: tuple[HeldObject, ...] = ()
-    """Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its own
+    """Objects that count as held for phases, by the simulator's contact forces; for an operator only those of its
     robot.
     """
 
@@ -161,19 +161,17 @@ class ReachReply(Reply):
     """Nearest approach of the right wrist; null if it was given no pose."""
 
     needs_a_step: bool | None = None
-    """True if the robot would most likely step to keep its balance under arms so far ahead: walk nearer instead.
-    Left out where it would not, and where the assistance is "paper".
+    """True if the robot would probably step for balance with its arms so far ahead: walk nearer instead. Left out
+    otherwise, and where the assistance is "paper".
     """
 
     joints_at_limit: tuple[str, ...]
-    """Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists
-    from coming nearer.
-    """
+    """Names of the waist and arm joints that would be at a limit, which keeps the wrists from coming nearer."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotState(Reply):
-    """The reply to `get_robot_state`. A short one has poses to the millimetre and to a thousandth."""
+    """The reply to `get_robot_state`. A short one rounds poses to a millimetre and a thousandth."""
 
     robot: str
     """The robot, for example "A"."""
@@ -182,7 +180,7 @@ class RobotState(Reply):
     """Simulated seconds since the episode began."""
 
     frame: PoseFrame | None = None
-    """The frame of the wrists where the call named another than that of the pelvis; left out otherwise."""
+    """Frame of the wrists, if the call named another than the pelvis; left out otherwise."""
 
     joint_positions_rad: dict[str, float] | None = None
     """Joint angles in radians; left out of a short reply."""
@@ -204,9 +202,9 @@ class RobotState(Reply):
     """Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame."""
 
     left_wrist_target: Pose | None = None
-    """Pose that the left wrist was commanded to, in the same frame, to be sent again to hold the hand: arms sag,
-    and one that is sent its measured pose again and again sinks. Left out where the arm keeps its joints
-    instead, and where the assistance is "paper".
+    """Commanded pose of the left wrist in the same frame. Send it again to hold the hand: arms sag, and a hand
+    that is repeatedly sent its measured pose sinks. Left out where the arm keeps its joints instead, and where
+    the assistance is "paper".
     """
 
     right_wrist_target: Pose | None = None
@@ -219,12 +217,12 @@ class RobotState(Reply):
 
     pelvis_in_start: Pose | None = None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
-    pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
+    pelvis at the start of the episode, z up, x along its heading. Drifts by up to 1 % of the distance walked.
     Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
     """
 
     pelvis_in_room: Pose | None = None
-    """The same in the room frame, where the call named that; left out otherwise."""
+    """The same in the room frame, if the call named it; left out otherwise."""
 
     base_command: BaseCommand | None = None
     """Base command in force; left out of a short reply where the robot stands as high as commanded."""
@@ -235,14 +233,14 @@ class RobotState(Reply):
     """
 
     samples: SensorSamples | None = None
-    """Readings of its sensors in each physics step of the last control step, where the call asks for `samples`;
-    left out where the assistance is "paper".
+    """Readings of its sensors in each physics step of the last control step, if the call requests `samples`; left
+    out where the assistance is "paper".
     """
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorSamples(Reply):
-    """Readings of a robot's sensors every 5 ms. The last ones are those of the reply's `time_s`."""
+    """Sensor readings of a robot every 5 ms. The last are at the reply's `time_s`."""
 
     joint_positions_rad: tuple[tuple[float, ...], ...]
     """Angles of the 43 joints in radians, in the order of `joint_positions_rad`."""
@@ -280,7 +278,7 @@ class StatusReply(Reply):
     """Control steps of 20 ms executed up to now, the initial hold included."""
 
     ended: EndReason | None = None
-    """Why the episode has ended; null while it goes on."""
+    """Cause of the end; null while the episode runs."""
 
     fallen: tuple[RobotFallen, ...] = ()
     """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
@@ -288,20 +286,18 @@ class StatusReply(Reply):
     """
 
     assistance: Assistance
-    """Amount of information. With "paper", phases are disclosed once the episode has ended, which success does not
-    do by itself: call finish. With "full", the last phase ends the episode.
+    """Amount of information. With "paper", phases are disclosed once the episode has ended; success does not end
+    it: call finish. With "full", the last phase ends the episode.
     """
 
     disclosure: Disclosure | None = None
-    """Disclosure of phases, where it is not the assistance's; left out otherwise."""
+    """Disclosure of phases, if unlike the assistance's; left out otherwise."""
 
     phases: tuple[PhaseReached, ...]
     """Every phase reached up to now, where the assistance discloses it."""
 
     next_phase: NextPhase | None = None
-    """The phase to reach next, and what it lacks; left out where the call did not ask for it, and where phases are
-    not disclosed.
-    """
+    """The next phase and its unmet conditions; left out unless requested, and where phases are not disclosed."""
 
     budget: Budget
     """Remaining budget of the episode."""

@@ -29,7 +29,7 @@ AgentEnding: TypeAlias = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class ModelEnding(Reply):
-    """End of a model's play, in its own words, too."""
+    """End of a model's play, with its own text."""
 
     robot: str | None = None
     """The robot that it directed; left out where it directed all."""
@@ -38,7 +38,7 @@ class ModelEnding(Reply):
     """The end."""
 
     text: str
-    """The words of the model or of its endpoint, as of a refusal; empty where there are none."""
+    """Text of the model or its endpoint, for example a refusal; empty where there is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class OperatorUse(Reply):
     """Its operator's requests."""
 
     thinking_s: float
-    """Wall clock that the operator has thought since its first request, while no step was made, in seconds."""
+    """Wall-clock thinking time of the operator since its first request, without steps, in seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ class ResultReply(Reply):
     """The rules that were in force."""
 
     phases: dict[str, float | None]
-    """Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed."""
+    """Simulated seconds at which phases were reached; null for one not reached or not disclosed."""
 
     success: bool | None = None
     """True if every phase was reached; left out where phases are not disclosed, and in results of earlier
@@ -77,14 +77,14 @@ class ResultReply(Reply):
     """
 
     ended: EndReason
-    """Why the episode ended."""
+    """Cause of its end."""
 
     env_steps: int
     """Control steps of 20 ms, the initial hold included."""
 
     tool_calls: int
-    """Calls of tools of all robots up to the end, reads, refused calls and the one that ended the episode
-    included. Each command of a plan or walk is one, and each slice of 5 steps with `until`.
+    """Tool calls of all robots, including reads, refused calls and the one that ended the episode. Each command of
+    a plan or walk counts as one, and each slice of 5 steps with `until`.
     """
 
     requests: int | None = None
@@ -93,8 +93,8 @@ class ResultReply(Reply):
     """
 
     thinking_s: float | None = None
-    """Wall clock that the policy has thought between its calls, in seconds; where each robot has its own operator,
-    that of all operators together.
+    """Wall-clock thinking time of the policy between its calls, in seconds; with one operator per robot, the sum
+    over all operators.
     """
 
     operators: tuple[OperatorUse, ...] = ()
@@ -104,7 +104,7 @@ class ResultReply(Reply):
     """Robots that fell."""
 
     realtime_factor: float
-    """Simulated seconds per second that the physics took."""
+    """Ratio of simulated time to physics wall clock."""
 
     state_hash: str | None = None
     """Hash of the whole physical state at the end, 16 hexadecimal digits; left out for a policy whose assistance
@@ -118,25 +118,25 @@ class ResultReply(Reply):
     """Amount of information that the policy got."""
 
     extra_information: tuple[str, ...] = ()
-    """Information that the policy got beyond the benchmark's own policies, for example "depth_images"; left out
-    where it was none.
+    """Information that the policy got and the benchmark withholds, for example "depth_images"; left out where
+    there was none.
     """
 
     extra_information_replies: dict[str, dict[str, int]] = field(default_factory=dict[str, dict[str, int]])
-    """Number of replies with each of it, by its name and by the robot it was of; left out where it was none, and
-    of a short reply.
+    """Number of replies with each kind, by its name and robot; left out where there was none, and of a short
+    reply.
     """
 
     joints_clamped_share: float | None = None
-    """Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there;
-    left out where none did.
+    """Share of the joint targets that exceeded joint limits by more than 0.01 rad and were clamped; left out where
+    none did.
     """
 
     departures: tuple[str, ...] = ()
     """Departures from the benchmark, for example "assistance: full"; left out where there was none."""
 
     recording_failed: str | None = None
-    """Why the recording is not complete; left out where it is."""
+    """Cause of an incomplete recording; left out otherwise."""
 
     usage: Usage | None = None
     """Usage that notes on the episode report; left out where there are none."""
@@ -144,7 +144,7 @@ class ResultReply(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotUsage(Reply):
-    """Usage of the model of one robot."""
+    """Usage of one robot's model."""
 
     robot: str
     """The robot that it directed."""
@@ -153,13 +153,13 @@ class RobotUsage(Reply):
     """The model, as its latest note names it; left out where none does."""
 
     input_tokens: int
-    """Tokens that it read, those from a cache included."""
+    """Input tokens, including cached ones."""
 
     output_tokens: int
-    """Tokens that it wrote."""
+    """Output tokens."""
 
     cached_tokens: int
-    """Number of read tokens that came from a cache."""
+    """Number of input tokens from a cache."""
 
     usd: float | None = None
     """Cost in US dollars; left out where no note has it."""
@@ -176,13 +176,13 @@ class Usage(Reply):
     """Number of notes."""
 
     input_tokens: int
-    """Tokens that models read, those from a cache included."""
+    """Input tokens of models, including cached ones."""
 
     output_tokens: int
-    """Tokens that models wrote."""
+    """Output tokens of models."""
 
     cached_tokens: int
-    """Number of read tokens that came from a cache."""
+    """Number of input tokens from a cache."""
 
     usd: float | None = None
     """Cost in US dollars; left out where no note has it."""
@@ -194,7 +194,7 @@ class Usage(Reply):
     """The models that notes name."""
 
     robots: tuple[RobotUsage, ...] = ()
-    """Parts of the sums that belong to one robot, of notes that name it; left out where none does."""
+    """Sums for each robot, from notes that name it; left out where none does."""
 
     endings: tuple[ModelEnding, ...] = ()
     """Ends of the models' play: one for all robots, or one for each that has reported it."""

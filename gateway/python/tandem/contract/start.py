@@ -13,7 +13,7 @@ from .replies import Protocol, StatusReply
 
 @dataclass(frozen=True, kw_only=True)
 class BaseLimits(Reply):
-    """The base commands that locomotion accepts; what lies beyond is moved to the limit and reported."""
+    """Base commands that locomotion accepts; values beyond are clamped and reported."""
 
     vx_m_s: Range
     """Forward velocity."""
@@ -33,7 +33,7 @@ class Brief(Reply):
     """Facts about the robots for seeing and acting, in words."""
 
     frames: str
-    """The frames that poses are given in."""
+    """Frames of poses."""
 
     partners: str
     """Relation of the frames of different robots."""
@@ -57,7 +57,7 @@ class Brief(Reply):
     """Grasping; left out where the server gives no hints."""
 
     grips: tuple[WorkedGrip, ...] = ()
-    """Grips that work, as `grasping` says how to use them; left out where the server gives no hints."""
+    """Working grips, explained in `grasping`; left out where the server gives no hints."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +68,8 @@ class Briefing(Reply):
     """Instruction for all robots."""
 
     shared_instruction: str | None = None
-    """Instruction for those who direct one robot each, where `instruction` says more than all of them may know;
-    left out otherwise.
+    """Instruction for operators of one robot each, if `instruction` says more than all may know; left out
+    otherwise.
     """
 
     instructions: tuple[Instruction, ...]
@@ -82,8 +82,8 @@ class Briefing(Reply):
     """The phases of the task, in the order they have to be reached; left out where the assistance is "paper"."""
 
     room: tuple[str, ...] = ()
-    """The things of the task: how large they are, along the first robot's axes, and how far from each robot they
-    stand before the seed moves them by a decimetre or so. Left out where the assistance is "paper".
+    """The task's objects: their sizes along the first robot's axes, and their distances from each robot before the
+    seed moves them by about a decimetre. Left out where the assistance is "paper".
     """
 
     ending: str
@@ -105,7 +105,7 @@ class Briefing(Reply):
     """Status of the episode after the initial hold."""
 
     recording_failed: str | None = None
-    """Why the recording is not complete; left out where it is."""
+    """Cause of an incomplete recording; left out otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +133,7 @@ class JointInfo(Reply):
     """Upper limit in radians."""
 
     effort_n_m: float
-    """The largest torque that its drive exerts, in newton metres."""
+    """Maximum torque of its drive, in newton metres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +147,7 @@ class PhaseInfo(Reply):
     """`p1`, `p2`, ..."""
 
     description: str
-    """When the phase counts as reached."""
+    """Condition for reaching the phase."""
 
     collaborative: bool
     """True if more than one robot has to work on it."""
@@ -161,7 +161,7 @@ class ProtocolInfo(Reply):
     """The protocol."""
 
     steps_per_command: int
-    """The most control steps of 20 ms that one command may ask for."""
+    """Maximum control steps of 20 ms per command."""
 
     episode_steps: int
     """Control steps of an episode, the initial hold included."""
@@ -173,15 +173,15 @@ class ProtocolInfo(Reply):
     """Seconds that the policy may spend between calls; null for no limit."""
 
     first_seed: int
-    """The seeds that results are reported on: the first."""
+    """First seed that results are reported on."""
 
     last_seed: int
-    """The seeds that results are reported on: the last."""
+    """Last seed that results are reported on."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Range(Reply):
-    """From `min` to `max`, both accepted, in the unit of the field that holds it."""
+    """From `min` to `max`, both included, in the unit of its field."""
 
     min: float
     """The smallest value accepted."""
@@ -232,9 +232,7 @@ class TaskInfo(Reply):
     """Id for start_episode, for example `handover`."""
 
     suite: str | None = None
-    """The suite that it belongs to, for example `tandem+`; left out of the benchmark's tasks and of those of
-    files.
-    """
+    """Its suite, for example `tandem+`; left out for tasks of the benchmark and from files."""
 
     instruction: str
     """Instruction for a policy of all robots."""
@@ -264,13 +262,13 @@ class TaskList(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class WorkedGrip(Reply):
-    """A grip that works, of a right hand whose robot faces the thing squarely."""
+    """A working grip of a right hand whose robot squarely faces the object."""
 
     thing: str
-    """Things that it suits."""
+    """Suitable objects."""
 
     place: str
-    """Point of the thing that `place_m` is."""
+    """Point of the object at `place_m`."""
 
     right_quaternion_wxyz: tuple[float, float, float, float]
     """Orientation of the right wrist, in the level frame."""
@@ -282,10 +280,10 @@ class WorkedGrip(Reply):
     """Place of that point in the right wrist's frame while the hand holds it; negate y for a left hand."""
 
     stops_m: tuple[tuple[float, float, float], ...]
-    """Stops of the hand on its way in, the farthest first: offsets from `place_m`."""
+    """Waypoints of the hand's approach, farthest first: offsets from `place_m`."""
 
     open_rad: tuple[float, float, float, float, float, float, float]
-    """Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all but the
+    """Right finger angles for approach and retreat, as in right_fingers_rad; a left hand negates all but the
     first.
     """
 
@@ -296,4 +294,4 @@ class WorkedGrip(Reply):
     """Distance of the pelvis behind the places of its hands; left out where that does not matter."""
 
     pelvis_height_m: float | None = None
-    """Pelvis height at which hands come there; left out where the robot stands upright."""
+    """Pelvis height for the grip; left out where the robot stands upright."""

@@ -48,7 +48,7 @@ class Tools(ABC):
 
         Args:
             robot: The robot, for example "A".
-            frame: Frame of the wrists; "room": and pelvis.
+            frame: Frame of wrists; "room": also of pelvis.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -75,8 +75,7 @@ class Tools(ABC):
             pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
             region: Pixels of a rectangle, row by row.
             fit: True: the largest plane in `region`, its straight edges and corners in place of points.
-            surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of
-                points.
+            surface: Middle, size, corners and, for an upright round object, axis of a surface in place of points.
             frame: Frame of the points.
         """
         arguments: dict[str, Any] = {
@@ -100,8 +99,8 @@ class Tools(ABC):
         frame: PoseFrame | None = None,
         keep_waist: bool | None = None,
     ) -> ReachReply:
-        """Ask whether wrists could reach poses, as of move_wrists, from where the robot stands, by the waist and
-        the arms that are given a pose. Nothing moves; costs no steps.
+        """Ask whether wrists could reach poses, as in move_wrists, from the robot's place, with the waist and the
+        arms that are given a pose. Nothing moves; costs no steps.
 
         Args:
             robot: The robot, for example "A".
@@ -110,7 +109,7 @@ class Tools(ABC):
             right_position_m: Right wrist.
             right_quaternion_wxyz: Right wrist orientation.
             frame: Frame of the poses.
-            keep_waist: True: with the waist as it is.
+            keep_waist: True: the waist stays fixed.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
