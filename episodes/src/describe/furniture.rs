@@ -15,8 +15,8 @@ const MAX_BOTTOM_M: f32 = 1.6;
 /// Maximum gap between a support and the piece that hides it.
 const MAX_GAP_M: f32 = 0.05;
 
-/// A fixed geom by its extent along the axes of the first robot's start frame, in world coordinates turned
-/// about the origin.
+/// Bounds of a fixed geom, in world coordinates that are turned about the origin to the heading at which the
+/// first robot starts.
 struct Piece<'a> {
     name: &'a str,
     low_m: Vector,

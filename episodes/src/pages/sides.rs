@@ -23,11 +23,11 @@ const DOWN_RAD: f32 = 0.65;
 const DISTANCE_PER_RADIUS: f32 = 2.4;
 const MIN_RADIUS_M: f32 = 0.05;
 
-/// If the scene cannot be read or drawn. The error lists all refused parts of the file.
+/// Draws a scene, as its file has it, from four sides into one PNG file.
 ///
 /// # Errors
 ///
-/// The scene cannot be read or drawn. The text lists all refused parts of the file.
+/// If the scene cannot be read or drawn. The error lists all refused parts of the file.
 pub fn draw_sides(scene: &Path) -> Result<Vec<u8>, EpisodeError> {
     let world = World::of_scene(Document::read(scene)?)?;
     let (step, mut renderer) = (world.present(), RendererKind::Cpu.renderer(Scenery::of(&world)));

@@ -15,7 +15,7 @@ const OBJECT_SHADE: [f32; 3] = [0.1, 0.2, 0.3];
 const CHECKER_DARK: f32 = 0.6;
 
 pub fn repaint(scenery: &mut Scenery, level: StressLevel, seed: u32) {
-    // Parts of one colour keep one colour.
+    // Parts that share a colour share the new one.
     let mut paints: Vec<[f32; 3]> = Vec::new();
     for part in &mut scenery.parts {
         let paint = match paints.iter().position(|known| *known == part.rgb) {

@@ -5,7 +5,6 @@ mod cameras;
 mod checkpoints;
 mod commands;
 mod common;
-mod exports;
 mod felt;
 mod files;
 mod films;

@@ -94,8 +94,8 @@ const STEPS: &[Step] = &[
         folder: "sim/src/render",
         extension: "rs",
         says: "impl Renderer for",
-        // In OpenAPI, "path" is a location of a parameter.
-        may: &["sim/src/render/", "tools_spec/src/schema/openapi.rs"],
+        // In OpenAPI, "path" is a location of a parameter; in glTF, the moved property of a node.
+        may: &["sim/src/render/", "tools_spec/src/schema/openapi.rs", "episodes/src/replay/export/gltf.rs"],
     },
 ];
 

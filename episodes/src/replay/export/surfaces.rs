@@ -111,8 +111,8 @@ fn with_uvs(mesh: &TriangleMesh, uvs: impl Fn([Vector; 3]) -> [[f32; 2]; 3]) -> 
 
 /// Returns the texture coordinates of a triangle on the face of a cube that its middle points to. The six
 /// images of a cube are below one another. Source of the faces' axes: MuJoCo's `render_gl3.c`.
-fn on_cube(directions: [Vector; 3], images: usize) -> [[f32; 2]; 3] {
-    let middle = directions.iter().sum::<Vector>();
+fn on_cube(corner_direction: [Vector; 3], images: usize) -> [[f32; 2]; 3] {
+    let middle = corner_direction.iter().sum::<Vector>();
     let axis = middle.abs().max_position();
     let sign = if middle[axis] < 0.0 { -1.0 } else { 1.0 };
     let (across, down) = match axis {
@@ -121,7 +121,7 @@ fn on_cube(directions: [Vector; 3], images: usize) -> [[f32; 2]; 3] {
         _ => (Vector::X * sign, Vector::NEG_Y),
     };
     let face = if images > 1 { 2 * axis + usize::from(sign < 0.0) } else { 0 };
-    directions.map(|direction| {
+    corner_direction.map(|direction| {
         let along = (direction[axis] * sign).max(f32::MIN_POSITIVE);
         let [u, v] = [across, down].map(|axis| (0.5 * axis.dot(direction) / along + 0.5).clamp(0.0, 1.0));
         [u, (face as f32 + v) / images as f32]

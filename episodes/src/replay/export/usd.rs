@@ -281,11 +281,11 @@ impl Layer {
     }
 }
 
-fn tuple(numbers: &[f32]) -> String {
+fn tuple(values: &[f32]) -> String {
     let mut text = String::from("(");
-    for (index, number) in numbers.iter().enumerate() {
+    for (index, value) in values.iter().enumerate() {
         // Writing to a string cannot fail.
-        let _ = write!(text, "{}{number}", if index > 0 { ", " } else { "" });
+        let _ = write!(text, "{}{value}", if index > 0 { ", " } else { "" });
     }
     text + ")"
 }

@@ -92,7 +92,7 @@ pub struct PhaseTracker {
 pub struct PhaseMemory {
     /// Time at which each phase was reached, in simulated seconds.
     reached_s: Vec<f64>,
-    /// True if the `first` of the present phase's sequence has held, unbroken.
+    /// True if `first` of the present phase's sequence has held, and `broken` has not held since.
     underway: bool,
     /// Time since which the present phase's lasting condition has held, in simulated seconds.
     since_s: Option<f64>,
@@ -218,7 +218,7 @@ impl PhaseMemory {
 /// it has held.
 fn lasted(since_s: &mut Option<f64>, condition: &Condition, for_s: f64, facts: &Facts) -> bool {
     *since_s = condition.holds(facts).then(|| since_s.unwrap_or(facts.time_s));
-    // Times are sums of control steps; half of one keeps rounding out.
+    // Times are sums of control steps; a tolerance of half a step absorbs rounding errors.
     since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S)
 }
 

@@ -1,5 +1,7 @@
 //! Tests of recordings rendered again: videos, and images with depth.
 
+mod exports;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
